@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "sqmap/asset/asset.hpp"
+#include "sqmap/asset/result.hpp"
+#include "sqmap/bake/decompose.hpp"
+#include "sqmap/bake/fit.hpp"
+#include "sqmap/bake/mesh.hpp"
+#include "sqmap/bake/progress.hpp"
+
+namespace sqmap::bake {
+
+/// Everything that decides the bytes of a bundle. Written into it as JSON.
+struct BakeOptions {
+  ReadOptions read;
+  RepairOptions repair;
+  DecomposeOptions decompose;
+  FitOptions fit;
+  double max_error_percent = 0.05;  ///< target of eq. 35, percent of R_max, > 0
+  std::uint32_t max_parts = 24;     ///< in [1, kMaxParts]
+  std::uint64_t max_bytes = 128 * 1024;  ///< of the encoded maps, about; resolution gives way first
+  std::uint32_t sample_count = 20000;    ///< points of each error measurement
+  std::uint64_t seed = 1;                ///< of the sample points
+
+  Outcome check() const;
+  std::string to_json() const;
+};
+
+/// CPU time of one stage.
+struct StageTime {
+  std::string stage;
+  double seconds;
+};
+
+struct BakeResult {
+  Asset asset;
+  std::vector<StageTime> times;  ///< not stored in the bundle
+  std::string stopped_by;        ///< "target", "parts" or "bytes": what ended the refinement
+};
+
+/// The whole line: check, repair, decompose, fit, map, measure.
+/// Errors: kBadOption, kInvalidMesh, kBakeFailed, kCancelled.
+Result<BakeResult> bake(const SourceMesh& source, const BakeOptions& options, const Progress& progress = {});
+
+}  // namespace sqmap::bake

@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "sqmap/bake/mesh.hpp"
+
+namespace sqmap::bake {
+
+/// Exact closest-point queries against a mesh (CGAL AABB tree), with the sign from the generalised winding number
+/// (Jacobson et al. 2013; Barill et al. 2018), so that open meshes have an inside too. Thread-safe once built.
+class Oracle {
+ public:
+  explicit Oracle(const Mesh& mesh);
+  ~Oracle();
+  Oracle(Oracle&&) noexcept;
+  Oracle& operator=(Oracle&&) noexcept;
+
+  struct Answer {
+    double distance_m;      ///< unsigned distance to the nearest point of the mesh
+    Vec3d nearest_m;        ///< that point
+    std::uint32_t face;     ///< a face that holds it
+  };
+  Answer nearest(const Vec3d& p_m) const;
+  /// Generalised winding number at p: about 1 inside a closed outward mesh, 0 outside, fractions near holes.
+  /// Evaluated hierarchically (dipole expansion per tree node) with error below 0.01 away from the surface.
+  double winding_number(const Vec3d& p_m) const;
+  /// True where the winding number exceeds 1/2.
+  bool inside(const Vec3d& p_m) const;
+  /// Negative inside [m].
+  double signed_distance(const Vec3d& p_m) const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+/// Every crossing of rays with a mesh, by Embree in robust mode, the distances recomputed in double on the triangles
+/// it reports. Thread-safe once built.
+class RayTracer {
+ public:
+  explicit RayTracer(const Mesh& mesh);
+  ~RayTracer();
+  RayTracer(RayTracer&&) noexcept;
+  RayTracer& operator=(RayTracer&&) noexcept;
+
+  struct Hit {
+    double t_m;          ///< distance along the ray
+    std::uint32_t face;
+    bool entering;       ///< the ray goes against the face's outward normal
+  };
+  /// All hits of the ray origin + t direction, t >= 0, ascending in t, |direction| = 1. A ray through an edge or a
+  /// vertex reports one hit for each crossing of the surface, not one a face. `hits` is cleared first.
+  void trace(const Vec3d& origin_m, const Vec3d& direction, std::vector<Hit>& hits) const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace sqmap::bake
