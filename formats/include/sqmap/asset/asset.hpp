@@ -23,9 +23,9 @@ enum class CutReason : std::uint8_t {
 /// One superquadric of an asset and the distance map on its surface.
 struct Part {
   Superquadric shape;
-  Pose object_from_part;     ///< p_object = R p_part + t
-  BoundingSphere sphere;     ///< encloses the superquadric, object frame
-  std::uint32_t segment{};   ///< natural part (salience segment) that this part refines
+  Pose object_from_part;    ///< p_object = R p_part + t
+  BoundingSphere sphere;    ///< encloses the superquadric, object frame
+  std::uint32_t segment{};  ///< natural part (salience segment) that this part refines
   CutReason reason{CutReason::kWhole};
   std::uint32_t vertex_count{};  ///< N_m of the paper's layer rule: mesh vertices of this part
   std::uint32_t face_count{};    ///< mesh faces of this part, after repair
@@ -34,8 +34,8 @@ struct Part {
   friend bool operator==(const Part&, const Part&) = default;
 };
 
-/// Errors of one level and layer against the exact mesh, as measured by the baker; lengths in percent of R_max.
-/// A value that could not be measured (no samples) is NaN.
+/// Errors of one level and layer against the exact mesh, as measured by the baker; lengths in percent of
+/// R_max. A value that could not be measured (no samples) is NaN.
 struct ErrorRow {
   std::uint32_t level{};
   std::uint32_t layer{};              ///< 1, 2 or 3
@@ -67,16 +67,16 @@ struct MeshRecord {
   std::uint32_t components{};
   std::uint32_t welded_vertices{}, degenerate_faces{}, duplicate_faces{}, flipped_faces{};
   std::uint32_t filled_holes{}, boundary_edges{}, non_manifold_edges{};
-  bool is_closed{};         ///< every edge has two faces after repair
-  double volume_m3{};       ///< signed volume after repair [m^3]
+  bool is_closed{};    ///< every edge has two faces after repair
+  double volume_m3{};  ///< signed volume after repair [m^3]
   friend bool operator==(const MeshRecord&, const MeshRecord&) = default;
 };
 
 /// A superquadric map: what sqbake makes, a bundle stores and the runtime loads. Immutable once built.
 /// Object frame, metres, right-handed. The meaning of every number is in formats/FORMAT.md.
 struct Asset {
-  double r_max_m{};          ///< R_max: largest distance between two vertices of the mesh [m]
-  BoundingSphere sphere;     ///< encloses every part's superquadric, object frame
+  double r_max_m{};       ///< R_max: largest distance between two vertices of the mesh [m]
+  BoundingSphere sphere;  ///< encloses every part's superquadric, object frame
   std::vector<Part> parts;
   /// Part index of each face of the *input* file, in its order; kNoPart for faces that repair dropped.
   std::vector<std::uint16_t> face_labels;

@@ -10,8 +10,9 @@
 //                           |   |   |   |
 //                  omega = -pi -pi/2 0 +pi/2      columns wrap: column 8 is column 0
 //
-// Nodes lie at equal arc lengths within each quadrant, so the planes of symmetry always fall on rows and columns.
-// Level l of the pyramid is every 2^l-th row and column of the same array: a coarse level costs no byte.
+// Nodes lie at equal arc lengths within each quadrant, so the planes of symmetry always fall on rows and
+// columns. Level l of the pyramid is every 2^l-th row and column of the same array: a coarse level costs no
+// byte.
 #pragma once
 
 #include <cstdint>
@@ -19,8 +20,8 @@
 
 namespace sqmap {
 
-/// Distance map of one part: for each node of a grid on its superquadric, the distances along the inward normal
-/// at which the ray enters or leaves the material of the *whole* mesh.
+/// Distance map of one part: for each node of a grid on its superquadric, the distances along the inward
+/// normal at which the ray enters or leaves the material of the *whole* mesh.
 struct DistanceMap {
   /// A second or later crossing of the ray of one texel.
   struct Crossing {
@@ -30,19 +31,19 @@ struct DistanceMap {
   };
   /// A mesh vertex projected into a cell (the paper's Step 3), kept where the four corners alone miss it.
   struct VertexSample {
-    std::uint32_t cell;      ///< row * cols + col of the cell's lowest corner; row in [0, rows - 1)
-    std::uint8_t row_256ths; ///< position inside the cell along the rows, in 1/256 of a cell
-    std::uint8_t col_256ths; ///< the same along the columns
-    std::uint16_t code;      ///< depth code of the vertex, as `code`
+    std::uint32_t cell;       ///< row * cols + col of the cell's lowest corner; row in [0, rows - 1)
+    std::uint8_t row_256ths;  ///< position inside the cell along the rows, in 1/256 of a cell
+    std::uint8_t col_256ths;  ///< the same along the columns
+    std::uint16_t code;       ///< depth code of the vertex, as `code`
     friend bool operator==(const VertexSample&, const VertexSample&) = default;
   };
 
-  std::uint32_t rows{};        ///< nodes along eta; rows - 1 is a multiple of 2 * 2^(level_count - 1)
-  std::uint32_t cols{};        ///< nodes along omega; a multiple of 4 * 2^(level_count - 1)
-  std::uint32_t level_count{}; ///< pyramid levels, 0 the finest
-  std::uint32_t bits{};        ///< significant bits of a code, in [4, 16]
-  double depth_min_m{};        ///< depth of code 0 [m], >= 0
-  double depth_step_m{};       ///< depth of one code step [m], >= 0
+  std::uint32_t rows{};         ///< nodes along eta; rows - 1 is a multiple of 2 * 2^(level_count - 1)
+  std::uint32_t cols{};         ///< nodes along omega; a multiple of 4 * 2^(level_count - 1)
+  std::uint32_t level_count{};  ///< pyramid levels, 0 the finest
+  std::uint32_t bits{};         ///< significant bits of a code, in [4, 16]
+  double depth_min_m{};         ///< depth of code 0 [m], >= 0
+  double depth_step_m{};        ///< depth of one code step [m], >= 0
 
   /// First crossing of each texel's ray, shape [rows, cols]: depth = depth_min_m + code * depth_step_m, or
   /// miss_code() where the ray crosses nothing that a query can reach.

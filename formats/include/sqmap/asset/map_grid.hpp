@@ -10,8 +10,9 @@ namespace sqmap {
 
 /// Nodes of one quadrant of a superellipse at equal arc lengths, FORMAT.md (S6).
 ///
-/// The curve is (alpha c(theta), beta s(theta)), theta from 0 to pi/2 the polar angle of the unit superellipse. Node 0
-/// is exactly (1, 0), node `cells` exactly (0, 1). Deterministic; cost is a fixed number of evaluations.
+/// The curve is (alpha c(theta), beta s(theta)), theta from 0 to pi/2 the polar angle of the unit
+/// superellipse. Node 0 is exactly (1, 0), node `cells` exactly (0, 1). Deterministic; cost is a fixed number
+/// of evaluations.
 ///
 /// @param alpha,beta  semi-axes [m], > 0
 /// @param e           exponent of the curve
@@ -22,8 +23,9 @@ std::vector<SuperellipsePoint<double>> quadrant_nodes(double alpha_m, double bet
 
 /// Where the nodes of a distance map lie on its superquadric, and where their rays point. Part frame.
 ///
-/// Rows follow the meridian superellipse with semi-axes (sqrt(a1 a2), a3) and exponent e1, columns the equator with
-/// (a1, a2) and e2, each at equal arc lengths (in place of the paper's eq. (9), whose spacing ignores the axes).
+/// Rows follow the meridian superellipse with semi-axes (sqrt(a1 a2), a3) and exponent e1, columns the
+/// equator with (a1, a2) and e2, each at equal arc lengths (in place of the paper's eq. (9), whose spacing
+/// ignores the axes).
 class MapGrid {
  public:
   /// rows - 1 must be a positive multiple of 2, cols a positive multiple of 4.
@@ -39,7 +41,8 @@ class MapGrid {
   Vec3d point(std::uint32_t row, std::uint32_t col) const noexcept {
     return surface_point(shape_, eta(row), omega(col));
   }
-  /// Outward unit normal n of a node. The node's ray runs along -n; the represented surface is r - D n (eq. 22).
+  /// Outward unit normal n of a node. The node's ray runs along -n; the represented surface is r - D n (eq.
+  /// 22).
   Vec3d normal(std::uint32_t row, std::uint32_t col) const noexcept {
     return surface_normal(shape_, eta(row), omega(col));
   }

@@ -21,8 +21,8 @@ struct Finding {
   std::string message;  ///< what was found and what is required, with the part
 };
 
-/// Every rule that the asset breaks, in order of rule and part; empty: valid. The reader, sqinfo and the tests
-/// share this one validator. Never throws but for memory; total for any Asset value, NaN included.
+/// Every rule that the asset breaks, in order of rule and part; empty: valid. The reader, sqinfo and the
+/// tests share this one validator. Never throws but for memory; total for any Asset value, NaN included.
 std::vector<Finding> validate(const Asset& asset, CheckLevel level);
 
 }  // namespace sqmap

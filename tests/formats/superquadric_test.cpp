@@ -1,0 +1,167 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "sqmap/asset/superquadric.hpp"
+
+#include <cmath>
+#include <numbers>
+#include <random>
+
+#include <gtest/gtest.h>
+
+namespace sqmap {
+namespace {
+
+constexpr double kPi = std::numbers::pi;
+const double kExponents[] = {0.1, 0.3, 1.0, 1.9, 2.0};
+
+/// The paper's eq. (1) as printed (2/e2 for its 2/e^2), in long double: shares no line with the ratio form.
+long double paper_f(const Superquadric& sq, const Vec3d& p) {
+  const long double e1 = sq.e1, e2 = sq.e2;
+  const long double x = std::pow(std::fabs(static_cast<long double>(p.x) / sq.semi_axes_m.x), 2 / e2);
+  const long double y = std::pow(std::fabs(static_cast<long double>(p.y) / sq.semi_axes_m.y), 2 / e2);
+  const long double z = std::pow(std::fabs(static_cast<long double>(p.z) / sq.semi_axes_m.z), 2 / e1);
+  return std::pow(std::pow(x + y, e2 / e1) + z, e1);
+}
+
+TEST(InsideOutside, AgreesWithThePaperInLongDouble) {
+  std::mt19937_64 rng(1);
+  std::uniform_real_distribution<double> unit(0, 1);
+  int inside = 0, count = 0;
+  for (const double e1 : kExponents) {
+    for (const double e2 : kExponents) {
+      for (int i = 0; i < 200; ++i, ++count) {
+        const Superquadric sq{{0.2 + unit(rng), 0.2 + unit(rng), 0.2 + unit(rng)}, e1, e2};
+        const Vec3d p{2 * unit(rng) - 1, 2 * unit(rng) - 1, 2 * unit(rng) - 1};
+        const auto expected = static_cast<double>(paper_f(sq, p));
+        EXPECT_NEAR(inside_outside(sq, p), expected, 1e-12 * expected);
+        inside += expected < 1;
+      }
+    }
+  }
+  EXPECT_GT(inside, count / 10);
+  EXPECT_LT(inside, count * 9 / 10);
+}
+
+TEST(InsideOutside, StaysAccurateInFloatAtEveryScaleAndExponent) {
+  std::mt19937_64 rng(2);
+  std::uniform_real_distribution<double> unit(0, 1);
+  for (const double e1 : kExponents) {
+    for (const double e2 : kExponents) {
+      for (double scale = 1e-6; scale < 2e6; scale *= 10) {
+        const Superquadric sq{{1, 0.5, 2}, e1, e2};
+        const SuperquadricOf<float> narrow{{1, 0.5F, 2}, static_cast<float>(e1), static_cast<float>(e2)};
+        const Vec3f p{static_cast<float>(scale * unit(rng)), static_cast<float>(scale * unit(rng)),
+                      static_cast<float>(scale * unit(rng))};
+        const auto expected = static_cast<double>(std::sqrt(paper_f(sq, cast<double>(p))));
+        const float beta = inside_outside_radial(narrow, p);
+        ASSERT_TRUE(std::isfinite(beta));
+        EXPECT_NEAR(beta, expected, 1e-6 * expected) << "e1 " << e1 << " e2 " << e2 << " scale " << scale;
+      }
+    }
+  }
+}
+
+TEST(InsideOutside, IsZeroAtTheCentreAndOneOnEverySemiAxis) {
+  for (const double e1 : kExponents) {
+    for (const double e2 : kExponents) {
+      const Superquadric sq{{3, 0.5, 7}, e1, e2};
+      EXPECT_EQ(inside_outside_radial(sq, {0, 0, 0}), 0);
+      EXPECT_EQ(inside_outside_radial(sq, {-3, 0, 0}), 1);
+      EXPECT_EQ(inside_outside_radial(sq, {0, 0.5, 0}), 1);
+      EXPECT_EQ(inside_outside_radial(sq, {0, 0, -7}), 1);
+    }
+  }
+}
+
+template <class T>
+class Poles : public testing::Test {};
+using Scalars = testing::Types<float, double>;
+TYPED_TEST_SUITE(Poles, Scalars);
+
+TYPED_TEST(Poles, NormalsAreFiniteUnitAndOutwardAtEveryPoleAxisAndSeam) {
+  using T = TypeParam;
+  for (const double e1 : kExponents) {
+    for (const double e2 : kExponents) {
+      const SuperquadricOf<T> sq{{T(1), T(0.2), T(10)}, T(e1), T(e2)};
+      for (const double eta : {-kPi / 2, 0.0, kPi / 2}) {
+        for (const double omega : {-kPi, -kPi / 2, 0.0, kPi / 2, kPi}) {
+          const auto u = superellipse_point<T>(std::cos(T(eta)), std::sin(T(eta)), T(e1));
+          const auto v = superellipse_point<T>(std::cos(T(omega)), std::sin(T(omega)), T(e2));
+          const Vec3<T> p = surface_point(sq, u, v), n = surface_normal(sq, u, v);
+          EXPECT_NEAR(norm(n), 1, 1e-5);
+          EXPECT_GT(dot(n, p), 0);
+          EXPECT_EQ(std::signbit(p.z), eta < 0) << "a pole changed sides";
+          EXPECT_NEAR(inside_outside_radial(sq, p), 1, 1e-5);
+        }
+      }
+    }
+  }
+}
+
+// The plane through a surface point across its normal supports the convex body: no other point lies beyond
+// it.
+TEST(SurfaceNormal, SupportsTheBody) {
+  std::mt19937_64 rng(3);
+  std::uniform_real_distribution<double> turn(-kPi, kPi);
+  for (const double e1 : kExponents) {
+    for (const double e2 : kExponents) {
+      const Superquadric sq{{1, 0.4, 2}, e1, e2};
+      const auto point = [&] {
+        const double eta = turn(rng) / 2, omega = turn(rng);
+        return std::pair{superellipse_point<double>(std::cos(eta), std::sin(eta), e1),
+                         superellipse_point<double>(std::cos(omega), std::sin(omega), e2)};
+      };
+      for (int i = 0; i < 200; ++i) {
+        const auto [u, v] = point();
+        const auto [a, b] = point();
+        const Vec3d n = surface_normal(sq, u, v);
+        EXPECT_LE(dot(n, surface_point(sq, a, b) - surface_point(sq, u, v)), 1e-12);
+      }
+    }
+  }
+}
+
+TEST(NormalAt, IsTheGradientOfTheInsideOutsideFunction) {
+  std::mt19937_64 rng(4);
+  std::uniform_real_distribution<double> unit(-1, 1);
+  for (const double e1 : {0.3, 1.0, 1.9}) {
+    for (const double e2 : {0.3, 1.0, 1.9}) {
+      const Superquadric sq{{1, 0.4, 2}, e1, e2};
+      for (int i = 0; i < 50; ++i) {
+        const Vec3d p{unit(rng), unit(rng), unit(rng)};
+        constexpr double kStep = 1e-6;
+        Vec3d gradient;
+        for (int axis = 0; axis < 3; ++axis) {
+          Vec3d step;
+          step[axis] = kStep;
+          gradient[axis] = inside_outside_radial(sq, p + step) - inside_outside_radial(sq, p - step);
+        }
+        EXPECT_NEAR(norm(normal_at(sq, p) - normalized(gradient)), 0, 1e-4);
+      }
+    }
+  }
+}
+
+TEST(BoundingRadius, IsTheFarthestSurfacePoint) {
+  for (const double e1 : kExponents) {
+    for (const double e2 : kExponents) {
+      for (const Vec3d axes : {Vec3d{1, 1, 1}, Vec3d{1, 0.3, 2}, Vec3d{5, 0.1, 0.4}}) {
+        const Superquadric sq{axes, e1, e2};
+        double farthest = 0;
+        for (int i = 0; i <= 400; ++i) {
+          for (int k = 0; k <= 400; ++k) {
+            const double eta = i * kPi / 800, omega = k * kPi / 800;
+            farthest = std::max(
+                farthest,
+                norm(surface_point(sq, superellipse_point<double>(std::cos(eta), std::sin(eta), e1),
+                                   superellipse_point<double>(std::cos(omega), std::sin(omega), e2))));
+          }
+        }
+        EXPECT_GE(bounding_radius_m(sq), farthest * (1 - 1e-14));
+        EXPECT_LE(bounding_radius_m(sq), farthest * (1 + 1e-3));
+      }
+    }
+  }
+}
+
+}  // namespace
+}  // namespace sqmap
