@@ -32,11 +32,11 @@ inline constexpr std::uint32_t kNowhere = 0xFFFFFFFF;
 
 /// What is known about one point. Object frame, metres.
 struct Answer {
-  /// Distance to the surface, negative inside. NaN where nothing is known: outside every superquadric (the point
-  /// is then outside the object, farther than `part` can tell), or in layer 1.
+  /// Distance to the surface, negative inside. NaN where nothing is known: outside every superquadric (the
+  /// point is then outside the object, farther than `part` can tell), or in layer 1.
   float signed_distance_m = std::numeric_limits<float>::quiet_NaN();
-  Vec3f normal;                   ///< outward unit normal of the object near the point; zero where unknown
-  Vec3f surface_m;                ///< the point of the surface that signed_distance_m speaks of; zero where unknown
+  Vec3f normal;     ///< outward unit normal of the object near the point; zero where unknown
+  Vec3f surface_m;  ///< the point of the surface that signed_distance_m speaks of; zero where unknown
   std::uint32_t part = kNowhere;  ///< part that answered; kNowhere: outside every superquadric
   Layer layer = Layer::kAuto;     ///< layer that answered; kAuto: none, the bounding spheres or a NaN input
   bool inside = false;
@@ -44,12 +44,12 @@ struct Answer {
 
 /// Where the results of a batch go. A span is either empty (not wanted) or as long as the points.
 struct Answers {
-  std::span<float> signed_distance_m;
-  std::span<Vec3f> normal;
-  std::span<Vec3f> surface_m;
-  std::span<std::uint32_t> part;
-  std::span<std::uint8_t> layer;
-  std::span<std::uint8_t> inside;
+  std::span<float> signed_distance_m{};
+  std::span<Vec3f> normal{};
+  std::span<Vec3f> surface_m{};
+  std::span<std::uint32_t> part{};
+  std::span<std::uint8_t> layer{};
+  std::span<std::uint8_t> inside{};
 };
 
 /// An asset made ready for queries. Immutable, so any number of threads may query one object.
@@ -62,24 +62,21 @@ class Object {
   Object(Object&&) noexcept;
   Object& operator=(Object&&) noexcept;
 
-  /// One point, object frame [m]. A point that is not finite gets the default Answer. Bounded time, no allocation.
+  /// One point, object frame [m]. A point that is not finite gets the default Answer. Bounded time, no
+  /// allocation.
   Answer query(const Vec3f& p_m, const QueryOptions& options = {}) const noexcept;
   /// Many points. Same answers as one at a time.
   void query(std::span<const Vec3f> points_m, const Answers& answers,
              const QueryOptions& options = {}) const noexcept;
-  /// True when layer `options.layer` finds the point inside; cheaper than query().
-  bool inside(const Vec3f& p_m, const QueryOptions& options = {}) const noexcept;
 
   std::size_t part_count() const noexcept;
-  std::uint32_t level_count() const noexcept;       ///< of the part that has most
-  const BoundingSphere& sphere() const noexcept;    ///< object frame
+  std::uint32_t level_count() const noexcept;     ///< of the part that has most
+  const BoundingSphere& sphere() const noexcept;  ///< object frame
   double r_max_m() const noexcept;
-  std::size_t resident_bytes() const noexcept;      ///< memory the object holds, itself included
-
-  struct Impl;
-  const Impl& impl() const noexcept { return *impl_; }  ///< for this library and its tests
+  std::size_t resident_bytes() const noexcept;  ///< memory the object holds, itself included
 
  private:
+  struct Impl;
   explicit Object(std::unique_ptr<Impl> impl);
   std::unique_ptr<Impl> impl_;
 };

@@ -1,0 +1,235 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "sqmap/runtime/object.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <random>
+#include <thread>
+
+#include <gtest/gtest.h>
+
+#include "support/analytic_asset.hpp"
+
+namespace sqmap::runtime {
+namespace {
+
+constexpr double kRadius = 0.8;
+const Vec3d kCentre{0.1, -0.05, 0.2};  // of the ball in test::ball_in_ellipsoid
+
+Object built(const Asset& asset) {
+  auto object = Object::build(asset);
+  EXPECT_TRUE(object.ok()) << (object ? "" : object.error().finding);
+  return std::move(object).value();
+}
+
+Vec3d random_direction(std::mt19937_64& rng) {
+  std::normal_distribution<double> normal;
+  return normalized(Vec3d{normal(rng), normal(rng), normal(rng)});
+}
+
+struct Worst {
+  double distance_m{}, normal{}, foot_m{};
+  int wrong_side{};
+};
+
+Worst worst_errors(const Object& object, Layer layer, std::uint32_t level) {
+  std::mt19937_64 rng(7);
+  std::uniform_real_distribution<double> depth(-0.1, 0.1);
+  Worst worst;
+  for (int i = 0; i < 2000; ++i) {
+    const Vec3d n = random_direction(rng);
+    const double d = depth(rng);
+    const Answer answer = object.query(cast<float>(kCentre + (kRadius + d) * n), {layer, level});
+    worst.wrong_side += answer.inside != (d < 0) && std::abs(d) > 1e-3;
+    worst.distance_m = std::max(worst.distance_m, std::abs(answer.signed_distance_m - d));
+    worst.normal = std::max(worst.normal, norm(cast<double>(answer.normal) - n));
+    worst.foot_m = std::max(worst.foot_m, norm(cast<double>(answer.surface_m) - (kCentre + kRadius * n)));
+  }
+  return worst;
+}
+
+TEST(Object, ThirdLayerTellsTheDistanceToABall) {
+  const Worst worst = worst_errors(built(test::ball_in_ellipsoid(kRadius, 65, 128)), Layer::kThree, 0);
+  EXPECT_LT(worst.distance_m, 1e-3);
+  EXPECT_LT(worst.normal, 0.06);  // bilinear depth: the slope errs by half a cell's turn, 0.05 rad here
+  EXPECT_LT(worst.foot_m, 5e-3);
+  EXPECT_EQ(worst.wrong_side, 0);
+}
+
+TEST(Object, ThirdLayerConvergesWithDensityAndSecondDoesNot) {
+  // Corollary 1: on a Q1 shape the represented surface converges. Depth along the superquadric's normal is
+  // not distance, however fine the map.
+  const double coarse =
+      worst_errors(built(test::ball_in_ellipsoid(kRadius, 17, 32)), Layer::kThree, 0).distance_m;
+  const double fine =
+      worst_errors(built(test::ball_in_ellipsoid(kRadius, 65, 128)), Layer::kThree, 0).distance_m;
+  EXPECT_LT(fine, coarse / 8) << "bilinear: second order";
+  const double second =
+      worst_errors(built(test::ball_in_ellipsoid(kRadius, 65, 128)), Layer::kTwo, 0).distance_m;
+  EXPECT_GT(second, 10 * fine);
+}
+
+TEST(Object, CoarseLevelAnswersLikeTheCoarseMap) {
+  const Object pyramid = built(test::ball_in_ellipsoid(kRadius, 65, 128, 3));
+  const Object coarse = built(test::ball_in_ellipsoid(kRadius, 17, 32));
+  EXPECT_EQ(pyramid.level_count(), 3U);
+  std::mt19937_64 rng(8);
+  for (int i = 0; i < 500; ++i) {
+    const Vec3f p = cast<float>(kCentre + 0.75 * random_direction(rng));
+    for (const Layer layer : {Layer::kTwo, Layer::kThree}) {
+      EXPECT_NEAR(pyramid.query(p, {layer, 2}).signed_distance_m,
+                  coarse.query(p, {layer, 0}).signed_distance_m, 2e-3);
+    }
+  }
+}
+
+TEST(Object, FirstLayerIsTheSuperquadricItself) {
+  const Object object = built(test::ball_in_ellipsoid(kRadius, 17, 32));
+  EXPECT_TRUE(object.query({1.14F, 0, 0}, {Layer::kOne}).inside);
+  EXPECT_FALSE(object.query({1.16F, 0, 0}, {Layer::kOne}).inside);
+  EXPECT_TRUE(std::isnan(object.query({1.14F, 0, 0}, {Layer::kOne}).signed_distance_m));
+  EXPECT_FALSE(object.query({1.14F, 0, 0}, {Layer::kTwo}).inside);
+}
+
+TEST(Object, AutomaticLayerFollowsThePapersRule) {
+  Asset asset = test::ball_in_ellipsoid(kRadius, 17, 32);
+  asset.parts[0].vertex_count = 17 * 32 / 10 + 1;  // rows * cols < 10 N_m
+  EXPECT_EQ(built(asset).query({0.5F, 0, 0}).layer, Layer::kThree);
+  asset.parts[0].vertex_count = 17 * 32 / 10;
+  EXPECT_EQ(built(asset).query({0.5F, 0, 0}).layer, Layer::kTwo);
+}
+
+TEST(Object, SaysNowhereOutsideEverySuperquadricAndForPointsThatAreNotFinite) {
+  const Object object = built(test::ball_in_ellipsoid(kRadius, 17, 32));
+  const float nan = std::numeric_limits<float>::quiet_NaN(),
+              infinity = std::numeric_limits<float>::infinity();
+  for (const Vec3f& p :
+       {Vec3f{5, 0, 0}, Vec3f{1e30F, 1e30F, -1e30F}, Vec3f{nan, 0, 0}, Vec3f{0, infinity, 0}}) {
+    const Answer answer = object.query(p);
+    EXPECT_FALSE(answer.inside);
+    EXPECT_EQ(answer.part, kNowhere);
+    EXPECT_TRUE(std::isnan(answer.signed_distance_m));
+    EXPECT_EQ(answer.normal, Vec3f{});
+  }
+}
+
+TEST(Object, AnswersAreFiniteAtCentrePolesSeamsAndAxes) {
+  const Object object = built(test::ball_in_ellipsoid(kRadius, 17, 32));
+  for (const float x : {-0.999F, -0.5F, -1e-30F, 0.0F, 1e-38F, 0.5F, 0.999F}) {
+    for (const Vec3f& p :
+         {Vec3f{x, 0, 0}, Vec3f{0, 1.2F * x, 0}, Vec3f{0, 0, 1.4F * x}, Vec3f{x / 2, x / 2, 0}}) {
+      for (const Layer layer : {Layer::kTwo, Layer::kThree}) {
+        const Answer answer = object.query(p, {layer});
+        EXPECT_TRUE(std::isfinite(answer.signed_distance_m)) << p.x << ' ' << p.y << ' ' << p.z;
+        EXPECT_NEAR(norm(answer.normal), 1, 1e-4);
+      }
+    }
+  }
+}
+
+TEST(Object, SecondSheetBehindTheFirstIsOutside) {
+  // A hollow ball: material between radii 0.6 and 0.8; the cavity is outside of the material.
+  Part part =
+      test::traced_part({{1, 1, 1}, 1, 1}, {}, 33, 64, 1, 1, [](const Vec3d&, const Vec3d&, bool& inside) {
+        inside = false;
+        return std::vector<double>{0.2, 0.4};
+      });
+  const Object object = built(test::asset_of({part}, 2));
+  std::mt19937_64 rng(9);
+  for (int i = 0; i < 200; ++i) {
+    const Vec3d n = random_direction(rng);
+    for (const Layer layer : {Layer::kTwo, Layer::kThree}) {
+      const auto ask = [&](double r) { return object.query(cast<float>(r * n), {layer}); };
+      EXPECT_FALSE(ask(0.85).inside);
+      EXPECT_TRUE(ask(0.7).inside);
+      EXPECT_FALSE(ask(0.55).inside);
+      EXPECT_NEAR(ask(0.55).signed_distance_m, 0.05, 3e-3);
+      EXPECT_NEAR(ask(0.62).signed_distance_m, -0.02, 3e-3);
+      EXPECT_LT(dot(cast<double>(ask(0.55).normal), n), -0.99) << "the cavity's wall faces the centre";
+    }
+  }
+}
+
+TEST(Object, CrossingASeamKeepsTheDepth) {
+  const std::vector<test::Ball> balls{{{-0.5, 0, 0}, 0.8}, {{0.5, 0.1, 0}, 0.7}};
+  const Object object = built(test::two_balls(balls, 65, 128));
+  // The plane z = 0 holds both centres, so nearest points lie in it: the outline of the union, densely.
+  std::vector<Vec3d> outline;
+  const auto inside_any = [&](const Vec3d& p) {
+    return std::any_of(balls.begin(), balls.end(),
+                       [&](const test::Ball& b) { return norm(p - b.centre_m) < b.radius_m - 1e-9; });
+  };
+  for (const test::Ball& b : balls) {
+    for (int i = 0; i < 4000; ++i) {
+      const double turn = i * 2 * 3.14159265358979 / 4000;
+      const Vec3d p = b.centre_m + b.radius_m * Vec3d{std::cos(turn), std::sin(turn), 0};
+      if (!inside_any(p)) outline.push_back(p);
+    }
+  }
+  const auto distance_m = [&](const Vec3d& p) {
+    double least = 1e9;
+    for (const Vec3d& q : outline) least = std::min(least, norm(p - q));
+    return least;
+  };
+  // Slide at constant depth over one ball, across the seam, onto the other.
+  int counted = 0, off = 0, wrong_side = 0;
+  for (const Vec3d& surface_m : outline) {
+    const Vec3d centre = norm(surface_m - balls[0].centre_m) < balls[0].radius_m + 1e-6 ? balls[0].centre_m
+                                                                                        : balls[1].centre_m;
+    const Vec3d p = surface_m - 0.02 * normalized(surface_m - centre);
+    const Answer answer = object.query(cast<float>(p), {Layer::kThree});
+    const double ratio = -answer.signed_distance_m / distance_m(p);
+    ++counted;
+    wrong_side += !answer.inside;
+    off += !(ratio > 0.5 && ratio < 1.5);
+  }
+  EXPECT_GT(counted, 4000);
+  EXPECT_EQ(wrong_side, 0);
+  // Cells that a seam passes through hold no patch; half a cell beside the seam the depth is to the nearest
+  // rim.
+  EXPECT_LE(off, counted / 100) << "depth jumps at the seam";
+}
+
+TEST(Object, BatchEqualsSinglePointsAndWritesOnlyWhatIsWanted) {
+  const Object object = built(test::ball_in_ellipsoid(kRadius, 17, 32));
+  std::mt19937_64 rng(10);
+  std::vector<Vec3f> points;
+  for (int i = 0; i < 300; ++i) points.push_back(cast<float>(1.1 * random_direction(rng)));
+  points.push_back({std::numeric_limits<float>::quiet_NaN(), 0, 0});
+  std::vector<float> distance(points.size(), 42);
+  std::vector<Vec3f> normal(points.size());
+  std::vector<std::uint8_t> inside(points.size());
+  object.query(points, {.signed_distance_m = distance, .normal = normal, .inside = inside});
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const Answer one = object.query(points[i]);
+    EXPECT_TRUE(distance[i] == one.signed_distance_m ||
+                (std::isnan(distance[i]) && std::isnan(one.signed_distance_m)));
+    EXPECT_EQ(normal[i], one.normal);
+    EXPECT_EQ(inside[i] != 0, one.inside);
+  }
+}
+
+TEST(Object, ManyThreadsReadOneObject) {
+  const Object object = built(test::ball_in_ellipsoid(kRadius, 33, 64));
+  std::vector<Vec3f> points;
+  std::mt19937_64 rng(11);
+  for (int i = 0; i < 2000; ++i) points.push_back(cast<float>(0.9 * random_direction(rng)));
+  std::vector<std::vector<float>> answers(4, std::vector<float>(points.size()));
+  {
+    std::vector<std::jthread> threads;
+    for (auto& out : answers) threads.emplace_back([&] { object.query(points, {.signed_distance_m = out}); });
+  }
+  for (const auto& out : answers) EXPECT_EQ(out, answers[0]);
+}
+
+TEST(Object, RefusesAnAssetThatBreaksARule) {
+  Asset asset = test::ball_in_ellipsoid(kRadius, 17, 32);
+  asset.parts[0].map.code.pop_back();
+  const auto object = Object::build(asset);
+  ASSERT_FALSE(object.ok());
+  EXPECT_EQ(object.error().status, Status::kInvalidAsset);
+}
+
+}  // namespace
+}  // namespace sqmap::runtime
