@@ -41,9 +41,10 @@ struct SourceMesh {
   UpAxis up{UpAxis::kZ};
 };
 
-/// Reads the triangles of a mesh file with assimp: OFF, OBJ, PLY, STL, glTF/GLB, DAE, FBX, 3MF. Node transforms of
-/// the scene are applied; all meshes of the scene are joined; lines and points are skipped. OFF files are read so
-/// that faces keep their order in the file.
+/// Reads the triangles of a mesh file: OFF and PLY in double and with the polygons numbered as in the file; OBJ, STL,
+/// glTF/GLB, DAE, FBX and 3MF through assimp, which keeps coordinates in float. Node transforms of a scene are
+/// applied; all its meshes are joined, and their polygons numbered mesh by mesh; lines and points are skipped. Files
+/// a scene refers to are opened only in its folder and below.
 /// Errors: kFileMissing, kFileUnreadable (a directory, a pipe, no permission), kUnknownFormat, kInvalidMesh
 /// (damaged, no faces, a coordinate that is NaN, infinite or beyond 1e15 m).
 Result<SourceMesh> read_mesh(const std::filesystem::path& path, const ReadOptions& options = {});

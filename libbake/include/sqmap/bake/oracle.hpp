@@ -10,8 +10,9 @@
 
 namespace sqmap::bake {
 
-/// Exact closest-point queries against a mesh (CGAL AABB tree), with the sign from the generalised winding number
-/// (Jacobson et al. 2013; Barill et al. 2018), so that open meshes have an inside too. Thread-safe once built.
+/// Exact closest-point queries against a mesh (CGAL AABB tree), with the sign from the generalised winding
+/// number (Jacobson et al. 2013; Barill et al. 2018), so that open meshes have an inside too. Thread-safe
+/// once built.
 class Oracle {
  public:
   explicit Oracle(const Mesh& mesh);
@@ -20,13 +21,15 @@ class Oracle {
   Oracle& operator=(Oracle&&) noexcept;
 
   struct Answer {
-    double distance_m;      ///< unsigned distance to the nearest point of the mesh
-    Vec3d nearest_m;        ///< that point
-    std::uint32_t face;     ///< a face that holds it
+    double distance_m;   ///< unsigned distance to the nearest point of the mesh
+    Vec3d nearest_m;     ///< that point
+    std::uint32_t face;  ///< a face that holds it
   };
+  /// NaN and kNewFace where p is not finite or the mesh has no faces.
   Answer nearest(const Vec3d& p_m) const;
   /// Generalised winding number at p: about 1 inside a closed outward mesh, 0 outside, fractions near holes.
-  /// Evaluated hierarchically (dipole expansion per tree node) with error below 0.01 away from the surface.
+  /// Evaluated hierarchically (second-order expansion per tree node) with error below 0.01 away from the
+  /// surface.
   double winding_number(const Vec3d& p_m) const;
   /// True where the winding number exceeds 1/2.
   bool inside(const Vec3d& p_m) const;
@@ -38,8 +41,9 @@ class Oracle {
   std::unique_ptr<Impl> impl_;
 };
 
-/// Every crossing of rays with a mesh, by Embree in robust mode, the distances recomputed in double on the triangles
-/// it reports. Thread-safe once built.
+/// Every crossing of rays with a mesh. Embree finds the boxes of triangles along a ray; whether and where it
+/// crosses them is computed in double, by a test that no shared edge or vertex can confuse. Thread-safe once
+/// built.
 class RayTracer {
  public:
   explicit RayTracer(const Mesh& mesh);
@@ -48,12 +52,14 @@ class RayTracer {
   RayTracer& operator=(RayTracer&&) noexcept;
 
   struct Hit {
-    double t_m;          ///< distance along the ray
+    double t_m;  ///< distance along the ray
     std::uint32_t face;
-    bool entering;       ///< the ray goes against the face's outward normal
+    bool entering;  ///< the ray goes against the face's outward normal
   };
-  /// All hits of the ray origin + t direction, t >= 0, ascending in t, |direction| = 1. A ray through an edge or a
-  /// vertex reports one hit for each crossing of the surface, not one a face. `hits` is cleared first.
+  /// All hits of the ray origin + t direction, t >= 0, ascending in t, |direction| = 1. A ray through an edge
+  /// or a vertex reports one hit for each crossing of the surface, not one a face, and none where it only
+  /// grazes. `hits` is cleared first and stays empty for rays that are not finite or not of unit length
+  /// within 1e-3.
   void trace(const Vec3d& origin_m, const Vec3d& direction, std::vector<Hit>& hits) const;
 
  private:
