@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+//
+// The model that fit.cpp optimises: a rigid superquadric, its 11 parameters, and the derivatives of log beta
+// and of the log-volume. Lengths are those of the normalised frame of fit.cpp (the set's half-extent is about
+// 1).
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "sqmap/asset/superquadric.hpp"
+#include "sqmap/asset/vec.hpp"
+
+namespace sqmap::bake::fit {
+
+/// Layout of a parameter vector: centre, rotation vector, logarithms of the semi-axes, exponents.
+enum Parameter : int { kCentre = 0, kTurn = 3, kLogAxes = 6, kE1 = 9, kE2 = 10, kParameterCount = 11 };
+using Vector = Eigen::Matrix<double, kParameterCount, 1>;
+using Matrix = Eigen::Matrix<double, kParameterCount, kParameterCount>;
+
+/// A superquadric in space.
+struct Placed {
+  Superquadric shape;
+  Eigen::Matrix3d part_axes = Eigen::Matrix3d::Identity();  ///< columns: x, y, z of the part
+  Vec3d centre;
+};
+
+struct Bounds {
+  Vector lower, upper;
+};
+
+/// The parameter vector of `at`; its rotation vector, which counts from at.part_axes, is zero.
+Vector parameters(const Placed& at);
+
+/// The superquadric at `x`, whose rotation vector counts from `part_axes` in the part's own frame. A local
+/// vector has no singularity within a turn of 180 degrees, where Euler angles lock.
+Placed placed(const Vector& x, const Eigen::Matrix3d& part_axes);
+
+/// log beta of one point and its derivatives by the parameters.
+struct LogBeta {
+  double value;
+  Vector gradient;
+};
+
+/// Evaluates log beta at many points for one parameter vector.
+class LogBetaModel {
+ public:
+  LogBetaModel(const Vector& x, const Eigen::Matrix3d& part_axes);
+  double value(const Vec3d& point) const noexcept;
+  LogBeta value_and_gradient(const Vec3d& point) const noexcept;
+
+ private:
+  Eigen::Vector3d local(const Vec3d& point) const noexcept;
+
+  Eigen::Vector3d centre_, log_axes_;
+  double e1_, e2_;
+  Eigen::Matrix3d axes_;           // columns: the part's axes
+  Eigen::Matrix3d turn_jacobian_;  // of the rotation by its vector, in the part's frame
+};
+
+/// Logarithm of the volume and its gradient.
+double log_volume(const Vector& x);
+Vector log_volume_gradient(const Vector& x);
+
+/// log of volume(x) * (max beta)^3: the volume once `placed` is inflated to bound the points.
+double inflated_log_volume(const Vector& x, const Eigen::Matrix3d& part_axes, std::span<const Vec3d> points);
+
+}  // namespace sqmap::bake::fit

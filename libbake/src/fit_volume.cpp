@@ -1,0 +1,120 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include <Eigen/Cholesky>
+
+#include "fit_solve.hpp"
+
+namespace sqmap::bake::fit {
+namespace {
+
+/// Value of log V + 3 log |beta|_p with a local model of it.
+struct Objective {
+  double value;
+  Vector gradient;
+  Matrix hessian;  ///< without the curvature of log beta itself: positive semi-definite, dominant for large p
+};
+
+class InflatedVolume {
+ public:
+  InflatedVolume(std::span<const Vec3d> points, const Eigen::Matrix3d& part_axes, double p)
+      : points_(points), part_axes_(part_axes), p_(p), log_betas_(points.size()) {}
+
+  double value(const Vector& x) {
+    const LogBetaModel model(x, part_axes_);
+    for (std::size_t i = 0; i < points_.size(); ++i) log_betas_[i] = model.value(points_[i]);
+    return log_volume(x) + 3 * log_p_norm();
+  }
+
+  Objective with_derivatives(const Vector& x) {
+    const LogBetaModel model(x, part_axes_);
+    for (std::size_t i = 0; i < points_.size(); ++i) log_betas_[i] = model.value(points_[i]);
+    const double log_norm = log_p_norm();
+    Vector mean = Vector::Zero();
+    Matrix square = Matrix::Zero();
+    for (std::size_t i = 0; i < points_.size(); ++i) {
+      const double weight = std::exp(p_ * (log_betas_[i] - log_norm));  // they sum to 1
+      if (weight < kNegligible) continue;
+      const Vector gradient = model.value_and_gradient(points_[i]).gradient;
+      mean += weight * gradient;
+      square.selfadjointView<Eigen::Lower>().rankUpdate(gradient, weight);
+    }
+    square.triangularView<Eigen::StrictlyUpper>() = square.transpose();
+    return {log_volume(x) + 3 * log_norm, log_volume_gradient(x) + 3 * mean,
+            3 * p_ * (square - mean * mean.transpose())};
+  }
+
+ private:
+  static constexpr double kNegligible = 1e-9;  ///< of the sum of weights
+
+  double log_p_norm() const {
+    const double farthest = *std::max_element(log_betas_.begin(), log_betas_.end());
+    double sum = 0;
+    for (const double log_beta : log_betas_) sum += std::exp(p_ * (log_beta - farthest));
+    return farthest + std::log(sum) / p_;
+  }
+
+  std::span<const Vec3d> points_;
+  Eigen::Matrix3d part_axes_;
+  double p_;
+  std::vector<double> log_betas_;
+};
+
+/// The Newton step of `model` with Marquardt's damping; parameters that would leave their bounds do not move.
+Vector damped_step(const Objective& model, const Vector& x, const Bounds& bounds, double damping) {
+  Matrix hessian = model.hessian;
+  Vector descent = -model.gradient;
+  // Directions without curvature (the scale; a turn about an axis of symmetry) must not give an endless step.
+  constexpr double kFloor = 1e-3;
+  hessian.diagonal() += damping * (hessian.diagonal().array() + kFloor).matrix();
+  for (int i = 0; i < kParameterCount; ++i) {
+    const bool blocked =
+        (descent[i] < 0 && x[i] <= bounds.lower[i]) || (descent[i] > 0 && x[i] >= bounds.upper[i]);
+    if (!blocked) continue;
+    hessian.row(i).setZero();
+    hessian.col(i).setZero();
+    hessian(i, i) = 1;
+    descent[i] = 0;
+  }
+  return hessian.ldlt().solve(descent);
+}
+
+int minimise(Vector& x, InflatedVolume& objective, const Bounds& bounds, int max_iterations) {
+  constexpr double kGain = 1e-6;  // of the log-volume: further steps would not show in a part
+  constexpr double kMaxDamping = 1e8;
+  double damping = 1e-2;
+  Objective model = objective.with_derivatives(x);
+  int iteration = 0;
+  while (iteration < max_iterations && damping < kMaxDamping) {
+    ++iteration;
+    const Vector next =
+        (x + damped_step(model, x, bounds, damping)).cwiseMax(bounds.lower).cwiseMin(bounds.upper);
+    const double gain = next.allFinite() ? model.value - objective.value(next) : -1;
+    if (!(gain > 0)) {  // NaN: refuse
+      damping *= 8;
+      continue;
+    }
+    x = next;
+    damping = std::max(damping / 5, 1e-6);
+    if (gain < kGain) break;
+    model = objective.with_derivatives(x);
+  }
+  return iteration;
+}
+
+}  // namespace
+
+void solve_volume(Candidate& candidate, std::span<const Vec3d> points, const Bounds& bounds,
+                  int max_iterations, double first_p, double last_p) {
+  for (double p = first_p; p <= last_p; p *= 4) {
+    Vector x = parameters(candidate.at).cwiseMax(bounds.lower).cwiseMin(bounds.upper);
+    InflatedVolume objective(points, candidate.at.part_axes, p);
+    candidate.iterations += minimise(x, objective, bounds, max_iterations);
+    candidate.at = placed(x, candidate.at.part_axes);
+  }
+}
+
+}  // namespace sqmap::bake::fit
