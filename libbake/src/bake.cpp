@@ -1,0 +1,198 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "sqmap/bake/bake.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <numbers>
+
+#include <tbb/parallel_for.h>
+
+#include "sqmap/asset/version.hpp"
+#include "sqmap/runtime/object.hpp"
+
+#include "hull.hpp"
+#include "map_builder.hpp"
+#include "measure.hpp"
+#include "part_builder.hpp"
+#include "partition.hpp"
+#include "refine.hpp"
+
+namespace sqmap::bake {
+
+namespace {
+
+// Finest map tried: 257 x 512 nodes.
+constexpr std::uint32_t kMostQuadrantCells = 128;
+// Each round that exceeds the byte budget loosens the target of the maps by this factor.
+constexpr double kLoosening = 1.3;
+// Vertex samples are kept where the surface misses the vertex by this multiple of the error target.
+constexpr double kVertexTolerance = 2;
+
+/// Names the stages and keeps their wall times.
+class Stages {
+ public:
+  explicit Stages(const Progress& progress) : progress_(progress) {}
+  void begin(const char* stage) {
+    end();
+    times.push_back({stage, 0});
+    start_ = std::chrono::steady_clock::now();
+    progress_.at(stage, 0);
+  }
+  void end() {
+    if (times.empty()) return;
+    times.back().seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
+  }
+  std::vector<StageTime> times;
+
+ private:
+  const Progress& progress_;
+  std::chrono::steady_clock::time_point start_;
+};
+
+/// Largest distance between two vertices [m]. Exact up to 4,000 hull vertices; of more, those extreme in as
+/// many directions are compared, which is short by less than 0.2 %.
+double largest_vertex_distance(const Mesh& mesh) {
+  constexpr std::size_t kMostCompared = 4000;
+  std::vector<Vec3d> points_m = convex_hull(mesh.vertices_m).vertices;
+  if (points_m.size() > kMostCompared) {
+    std::vector<std::size_t> extreme(kMostCompared);
+    tbb::parallel_for(std::size_t{0}, kMostCompared, [&](std::size_t k) {
+      const double z = 1 - (2 * static_cast<double>(k) + 1) / kMostCompared;
+      const double turn = 2 * std::numbers::pi * static_cast<double>(k) / std::numbers::phi;
+      const double ring = std::sqrt(1 - z * z);
+      const Vec3d direction{ring * std::cos(turn), ring * std::sin(turn), z};
+      for (std::size_t i = 1; i < points_m.size(); ++i) {
+        if (dot(direction, points_m[i]) > dot(direction, points_m[extreme[k]])) extreme[k] = i;
+      }
+    });
+    std::sort(extreme.begin(), extreme.end());
+    extreme.erase(std::unique(extreme.begin(), extreme.end()), extreme.end());
+    std::vector<Vec3d> kept;
+    for (const std::size_t k : extreme) kept.push_back(points_m[k]);
+    points_m = std::move(kept);
+  }
+  double square = 0;
+  for (std::size_t i = 0; i < points_m.size(); ++i) {
+    for (std::size_t k = i + 1; k < points_m.size(); ++k) {
+      const Vec3d d = points_m[i] - points_m[k];
+      square = std::max(square, dot(d, d));
+    }
+  }
+  return std::sqrt(square);
+}
+
+/// Parts by descending volume of their superquadrics' spheres would depend on ties; the centre decides them.
+void sort_pieces(std::vector<Piece>& pieces) {
+  std::sort(pieces.begin(), pieces.end(), [](const Piece& a, const Piece& b) {
+    if (a.part.segment != b.part.segment) return a.part.segment < b.part.segment;
+    if (a.part.volume_m3 != b.part.volume_m3) return a.part.volume_m3 > b.part.volume_m3;
+    const Vec3d &u = a.part.sphere.centre_m, &v = b.part.sphere.centre_m;
+    return std::tie(u.x, u.y, u.z) < std::tie(v.x, v.y, v.z);
+  });
+}
+
+/// Memory of a map in packed codes and side lists, the measure of BakeOptions::max_bytes.
+std::uint64_t packed_bytes(const DistanceMap& map) {
+  return (map.code.size() * map.bits + 7) / 8 + map.start_inside.size() +
+         map.crossings.size() * sizeof(DistanceMap::Crossing) +
+         map.vertex_samples.size() * sizeof(DistanceMap::VertexSample);
+}
+
+/// Draws the maps of all parts within the byte budget. True: the budget, not the target, decided.
+bool map_parts(std::vector<Part>& parts, const MeshQueries& queries, double target_m,
+               std::uint64_t max_bytes) {
+  for (double loosened_m = target_m;; loosened_m *= kLoosening) {
+    tbb::parallel_for(std::size_t{0}, parts.size(), [&](std::size_t k) {
+      map_part(parts[k], queries, {loosened_m, kMostQuadrantCells});
+      add_vertex_samples(parts[k], queries, kVertexTolerance * loosened_m);
+    });
+    std::uint64_t bytes = 0;
+    bool coarsest = true;
+    for (const Part& part : parts) {
+      bytes += packed_bytes(part.map);
+      coarsest = coarsest && part.map.rows <= 9 && part.map.bits <= 4;
+    }
+    if (bytes <= max_bytes || coarsest || loosened_m > 1e3 * target_m) return loosened_m > target_m;
+  }
+}
+
+std::vector<std::uint16_t> label_faces(const std::vector<Piece>& pieces, const Mesh& mesh,
+                                       std::uint32_t source_faces) {
+  std::vector<std::uint16_t> labels(source_faces, kNoPart);
+  for (std::size_t k = 0; k < pieces.size(); ++k) {
+    for (const std::uint32_t face : pieces[k].cell.solid.face) {
+      if (face == kNewFace || mesh.source_face[face] >= source_faces) continue;
+      labels[mesh.source_face[face]] = static_cast<std::uint16_t>(k);
+    }
+  }
+  return labels;
+}
+
+Provenance provenance(const SourceMesh& source, const BakeOptions& options) {
+  static constexpr const char* kAxisNames[] = {"x", "y", "z"};
+  return {"sqbake",
+          kVersion,
+          source.name,
+          source.hash,
+          options.to_json(),
+          source.metres_per_unit,
+          kAxisNames[static_cast<int>(source.up)]};
+}
+
+}  // namespace
+
+Result<BakeResult> bake(const SourceMesh& source, const BakeOptions& options, const Progress& progress) {
+  if (auto outcome = options.check(); !outcome) return outcome.error();
+  const auto cancelled = [] { return Error{Status::kCancelled, "cancelled", ""}; };
+  Stages stages(progress);
+
+  stages.begin("repair");
+  auto repaired = check_and_repair(source, options.repair);
+  if (!repaired) return repaired.error();
+  const PreparedMesh& prepared = repaired.value();
+
+  stages.begin("index");
+  const Oracle oracle(prepared.mesh);
+  const RayTracer rays(prepared.mesh);
+  const MeshQueries queries{prepared.mesh, rays, oracle, prepared.record.is_closed};
+  const double r_max_m = largest_vertex_distance(prepared.mesh);
+  if (progress.stop()) return cancelled();
+
+  stages.begin("decompose");
+  auto segments = decompose(prepared, options.decompose, progress);
+  if (!segments) return segments.error();
+  auto [set, whole] = SolidSet::whole(prepared.mesh);
+
+  stages.begin("refine");
+  auto refined =
+      refine(set, close_segments(set, whole, segments.value()), queries, r_max_m, options, progress);
+  if (!refined) return refined.error();
+  std::vector<Piece>& pieces = refined.value().pieces;
+  sort_pieces(pieces);
+
+  stages.begin("map");
+  BakeResult result;
+  result.stopped_by = refined.value().stopped_by;
+  Asset& asset = result.asset;
+  asset.r_max_m = r_max_m;
+  for (const Piece& piece : pieces) asset.parts.push_back(piece.part);
+  asset.sphere = enclosing_sphere(asset.parts);
+  if (map_parts(asset.parts, queries, options.max_error_percent / 100 * r_max_m, options.max_bytes)) {
+    result.stopped_by = "bytes";
+  }
+  asset.face_labels = label_faces(pieces, prepared.mesh, source.source_face_count);
+  asset.mesh = prepared.record;
+  asset.provenance = provenance(source, options);
+  if (progress.stop()) return cancelled();
+
+  stages.begin("measure");
+  auto object = runtime::Object::build(asset);
+  if (!object) return object.error();
+  asset.errors = measure(asset, object.value(), queries, options.sample_count, options.seed);
+  stages.end();
+  result.times = std::move(stages.times);
+  return result;
+}
+
+}  // namespace sqmap::bake

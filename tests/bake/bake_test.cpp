@@ -1,0 +1,177 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "sqmap/bake/bake.hpp"
+
+#include <cmath>
+#include <random>
+
+#include <gtest/gtest.h>
+
+#include "sqmap/asset/validate.hpp"
+#include "sqmap/bake/oracle.hpp"
+#include "sqmap/runtime/object.hpp"
+
+#include "support/shapes.hpp"
+
+namespace sqmap::bake {
+namespace {
+
+BakeOptions quick_options() {
+  BakeOptions options;
+  options.sample_count = 3000;
+  options.max_parts = 8;
+  options.max_error_percent = 0.1;
+  return options;
+}
+
+struct NamedShape {
+  const char* name;
+  Mesh mesh;
+  double volume_m3;
+  double most_depth_error_percent = 0.12;
+};
+
+std::vector<NamedShape> analytic_shapes() {
+  constexpr double kPi = 3.14159265358979;
+  return {
+      {"sphere", test::sphere(0.7, 4), 4.0 / 3 * kPi * 0.343},
+      {"ellipsoid", test::ellipsoid({0.3, 0.6, 0.9}, 4), 4.0 / 3 * kPi * 0.162},
+      {"box", test::box({0.4, 0.5, 0.6}), 0.96},
+      {"cylinder", test::cylinder(0.4, 0.6, 64), kPi * 0.16 * 1.2},
+      {"cone", test::cone(0.5, 1.0, 64), kPi * 0.25 / 3,
+       0.2},  // a base seen edge-on by the rays of the sides, in large triangles that cannot be cut
+      {"torus", test::torus(1, 0.3, 64, 32), 2 * kPi * kPi * 0.09},
+  };
+}
+
+const ErrorRow& finest(const Asset& asset, std::uint32_t layer) {
+  for (const ErrorRow& row : asset.errors) {
+    if (row.level == 0 && row.layer == layer) return row;
+  }
+  ADD_FAILURE() << "no row for layer " << layer;
+  return asset.errors.front();
+}
+
+class AnalyticShape : public testing::TestWithParam<int> {};
+
+TEST_P(AnalyticShape, IsBoundedAndItsDistancesAreTrue) {
+  const NamedShape shape = analytic_shapes()[GetParam()];
+  SCOPED_TRACE(shape.name);
+  auto result = bake(test::as_source(shape.mesh), quick_options());
+  ASSERT_TRUE(result.ok()) << result.error().finding;
+  const Asset& asset = result.value().asset;
+  EXPECT_TRUE(validate(asset, CheckLevel::kFull).empty());
+  EXPECT_NEAR(asset.mesh.volume_m3, shape.volume_m3, 0.02 * shape.volume_m3);
+
+  // Every vertex of a face lies in the superquadric of the face's part.
+  for (std::size_t f = 0; f < shape.mesh.faces.size(); ++f) {
+    const std::uint16_t label = asset.face_labels[f];
+    ASSERT_LT(label, asset.parts.size());
+    const Part& part = asset.parts[label];
+    for (const std::uint32_t v : shape.mesh.faces[f]) {
+      const Vec3d p = rotation(part.object_from_part.orientation)
+                          .apply_inverse(shape.mesh.vertices_m[v] - part.object_from_part.translation_m);
+      EXPECT_LE(inside_outside_radial(part.shape, p), 1);
+    }
+  }
+
+  // The baker's own figures, and the same again with points and an oracle of the test's.
+  EXPECT_LE(finest(asset, 3).eq35_percent, 0.1);
+  EXPECT_LE(finest(asset, 3).depth_mean_percent, shape.most_depth_error_percent);
+  auto object = runtime::Object::build(asset);
+  ASSERT_TRUE(object.ok());
+  const Oracle oracle(shape.mesh);
+  std::mt19937_64 rng(3);
+  std::uniform_real_distribution<double> unit(-1.1, 1.1);
+  Vec3d half;
+  for (const Vec3d& v : shape.mesh.vertices_m) {
+    for (int axis = 0; axis < 3; ++axis) half[axis] = std::max(half[axis], std::abs(v[axis]));
+  }
+  int inside = 0, wrong = 0, far_wrong = 0;
+  for (int i = 0; i < 3000; ++i) {
+    const Vec3f p = cast<float>(Vec3d{half.x * unit(rng), half.y * unit(rng), half.z * unit(rng)});
+    const double truth_m = oracle.signed_distance(cast<double>(p));
+    const bool told = object.value().query(p, {runtime::Layer::kThree, 0}).inside;
+    inside += truth_m < 0;
+    wrong += told != (truth_m < 0);
+    far_wrong += told != (truth_m < 0) && std::abs(truth_m) > 0.02 * asset.r_max_m;
+  }
+  EXPECT_GT(inside, 50);
+  EXPECT_LE(wrong, 30);
+  EXPECT_EQ(far_wrong, 0);
+}
+
+INSTANTIATE_TEST_SUITE_P(Bake, AnalyticShape, testing::Range(0, 6),
+                         [](const auto& shape) { return std::string(analytic_shapes()[shape.param].name); });
+
+TEST(Bake, ConvexSuperquadricsStayOnePart) {
+  for (const int index : {0, 1}) {
+    const NamedShape shape = analytic_shapes()[index];
+    auto result = bake(test::as_source(shape.mesh), quick_options());
+    ASSERT_TRUE(result.ok());
+    EXPECT_EQ(result.value().asset.parts.size(), 1U) << shape.name;
+    EXPECT_EQ(result.value().stopped_by, "target");
+  }
+}
+
+TEST(Bake, TwoOverlappingSpheresOfFigure4) {
+  const Mesh mesh = test::two_spheres(0.6, 0.4, 48);
+  auto result = bake(test::as_source(mesh), quick_options());
+  ASSERT_TRUE(result.ok()) << result.error().finding;
+  EXPECT_LE(finest(result.value().asset, 3).depth_mean_percent, 0.12);
+  EXPECT_LE(finest(result.value().asset, 3).misclassified_3_percent, 1.2);
+}
+
+TEST(Bake, IsTheSameTwice) {
+  const NamedShape shape = analytic_shapes()[5];
+  auto first = bake(test::as_source(shape.mesh), quick_options());
+  auto second = bake(test::as_source(shape.mesh), quick_options());
+  ASSERT_TRUE(first.ok() && second.ok());
+  EXPECT_EQ(first.value().asset.parts, second.value().asset.parts);
+  EXPECT_EQ(first.value().asset.face_labels, second.value().asset.face_labels);
+}
+
+TEST(Bake, ScalesWithTheMesh) {
+  for (const double scale : {1e-3, 1e3}) {
+    Mesh mesh = test::torus(1, 0.3, 48, 24);
+    auto unit = bake(test::as_source(mesh), quick_options());
+    for (Vec3d& v : mesh.vertices_m) v = scale * v;
+    auto scaled = bake(test::as_source(mesh), quick_options());
+    ASSERT_TRUE(unit.ok() && scaled.ok());
+    EXPECT_NEAR(scaled.value().asset.r_max_m, scale * unit.value().asset.r_max_m, 1e-9 * scale);
+    EXPECT_LE(finest(scaled.value().asset, 3).depth_mean_percent, 0.12);
+  }
+}
+
+TEST(Bake, StopsWhenAsked) {
+  Progress progress;
+  int asked = 0;
+  progress.cancelled = [&] { return ++asked > 1; };
+  auto result = bake(test::as_source(test::torus(1, 0.3, 48, 24)), quick_options(), progress);
+  ASSERT_FALSE(result.ok());
+  EXPECT_EQ(result.error().status, Status::kCancelled);
+}
+
+TEST(Bake, NamesTheOptionItRefuses) {
+  BakeOptions options;
+  options.max_error_percent = -1;
+  auto result = bake(test::as_source(test::sphere(1, 2)), options);
+  ASSERT_FALSE(result.ok());
+  EXPECT_EQ(result.error().status, Status::kBadOption);
+  EXPECT_NE(result.error().finding.find("max_error_percent = -1"), std::string::npos);
+}
+
+TEST(Bake, KeepsToTheByteBudgetAndSaysSo) {
+  BakeOptions options = quick_options();
+  options.max_error_percent = 0.005;
+  options.max_parts = 3;
+  options.max_bytes = 6000;
+  auto result = bake(test::as_source(test::torus(1, 0.3, 48, 24)), options);
+  ASSERT_TRUE(result.ok());
+  std::size_t bits = 0;
+  for (const Part& part : result.value().asset.parts) bits += part.map.code.size() * part.map.bits;
+  EXPECT_LE(bits / 8, 6000U);
+  EXPECT_EQ(result.value().stopped_by, "bytes");
+}
+
+}  // namespace
+}  // namespace sqmap::bake
