@@ -1,0 +1,127 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "console.hpp"
+
+#include <cerrno>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <utility>
+
+#include <fmt/format.h>
+#include <sys/ioctl.h>
+#include <unistd.h>
+
+namespace sqmap::apps {
+namespace {
+
+constexpr const char* kRed = "\033[1;31m";
+constexpr const char* kYellow = "\033[1;33m";
+constexpr const char* kPlain = "\033[0m";
+
+bool is_dumb_terminal() {
+  const char* term = std::getenv("TERM");
+  return term == nullptr || std::string_view(term) == "dumb";
+}
+
+bool wants_color(bool is_terminal) {
+  const char* no_color = std::getenv("NO_COLOR");
+  return is_terminal && !is_dumb_terminal() && (no_color == nullptr || *no_color == '\0');
+}
+
+std::size_t terminal_width() {
+  winsize size{};
+  if (ioctl(STDERR_FILENO, TIOCGWINSZ, &size) != 0 || size.ws_col == 0) return 80;
+  return size.ws_col;
+}
+
+/// A file name may hold line feeds and escape sequences: they must not forge lines or drive the terminal.
+std::string printable(std::string_view text) {
+  std::string result;
+  result.reserve(text.size());
+  for (const char c : text) {
+    const auto byte = static_cast<unsigned char>(c);
+    if (byte < 0x20 || byte == 0x7F) {
+      result += fmt::format("\\x{:02x}", byte);
+    } else {
+      result += c;
+    }
+  }
+  return result;
+}
+
+}  // namespace
+
+Console::Console(std::string program)
+    : program_(std::move(program)),
+      stderr_is_terminal_(isatty(STDERR_FILENO) == 1 && !is_dumb_terminal()),
+      color_(wants_color(stderr_is_terminal_)) {}
+
+Console::~Console() { status({}); }
+
+void Console::set_color(When when) {
+  color_ = when == When::kAlways || (when == When::kAuto && wants_color(stderr_is_terminal_));
+}
+
+void Console::out(std::string_view text) {
+  const std::scoped_lock lock(mutex_);
+  clear_status();
+  if (out_errno_ != 0) return;
+  errno = 0;
+  if (std::fwrite(text.data(), 1, text.size(), stdout) != text.size() || std::fflush(stdout) != 0)
+    out_errno_ = errno != 0 ? errno : EIO;
+}
+
+void Console::error(std::string_view message) { say("error", kRed, message); }
+
+void Console::warning(std::string_view message) {
+  if (!quiet_) say("warning", kYellow, message);
+}
+
+void Console::note(std::string_view message) {
+  if (!quiet_) say(nullptr, nullptr, message);
+}
+
+void Console::say(const char* kind, const char* color, std::string_view message) {
+  const std::scoped_lock lock(mutex_);
+  clear_status();
+  std::string line = program_ + ": ";
+  if (kind != nullptr)
+    line += color_ ? fmt::format("{}{}:{} ", color, kind, kPlain) : fmt::format("{}: ", kind);
+  line += printable(message) + "\n";
+  std::fwrite(line.data(), 1, line.size(), stderr);
+}
+
+void Console::status(std::string_view line) {
+  if (!stderr_is_terminal_) return;
+  const std::scoped_lock lock(mutex_);
+  clear_status();
+  status_ = printable(line).substr(0, terminal_width() - 1);
+  std::fwrite(status_.data(), 1, status_.size(), stderr);
+  std::fflush(stderr);
+}
+
+void Console::clear_status() {
+  if (status_.empty()) return;
+  std::fputs("\r\033[K", stderr);
+  status_.clear();
+}
+
+Exit Console::finish(Exit code) {
+  status({});
+  if (std::fflush(stdout) != 0 && out_errno_ == 0) out_errno_ = errno;
+  if (out_errno_ == 0) return code;
+  if (out_errno_ == EPIPE) return Exit::kPipeClosed;
+  error(fmt::format("standard output: {}; free space, or send the output elsewhere",
+                    std::strerror(out_errno_)));
+  return Exit::kFileAccess;
+}
+
+std::string message_for(std::string_view file, const Error& error) {
+  std::string message;
+  if (error.finding.find(file) == std::string::npos) message += std::string(file) + ": ";
+  message += error.finding;
+  if (!error.remedy.empty()) message += "; " + error.remedy;
+  return message;
+}
+
+}  // namespace sqmap::apps

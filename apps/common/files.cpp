@@ -1,0 +1,114 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "files.hpp"
+
+#include <cerrno>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <utility>
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+namespace sqmap::apps {
+namespace {
+
+/// A file descriptor that closes itself.
+class Descriptor {
+ public:
+  explicit Descriptor(int fd) noexcept : fd_(fd) {}
+  ~Descriptor() {
+    if (fd_ >= 0) ::close(fd_);
+  }
+  Descriptor(const Descriptor&) = delete;
+  Descriptor& operator=(const Descriptor&) = delete;
+  int get() const noexcept { return fd_; }
+  /// Closes now, so that errors the system reports late are seen. 0 or errno.
+  int close() noexcept {
+    const int fd = std::exchange(fd_, -1);
+    return ::close(fd) == 0 ? 0 : errno;
+  }
+
+ private:
+  int fd_;
+};
+
+Result<std::vector<std::uint8_t>> read_all(int fd, const std::string& name, std::uint64_t max_bytes) {
+  std::vector<std::uint8_t> bytes;
+  std::size_t used = 0;
+  for (;;) {
+    if (used == bytes.size()) bytes.resize(used + (used < (1U << 16) ? (1U << 16) : used));
+    const ssize_t count = ::read(fd, bytes.data() + used, bytes.size() - used);
+    if (count < 0 && errno == EINTR) continue;
+    if (count < 0)
+      return Error{Status::kFileUnreadable, fmt::format("{}: {}", name, std::strerror(errno)), ""};
+    if (count == 0) break;
+    used += static_cast<std::size_t>(count);
+    if (used > max_bytes)
+      return Error{Status::kFileUnreadable, fmt::format("{}: more than {} bytes", name, max_bytes), ""};
+  }
+  bytes.resize(used);
+  return bytes;
+}
+
+/// 0 or errno.
+int write_all(int fd, std::span<const std::uint8_t> bytes) {
+  while (!bytes.empty()) {
+    const ssize_t count = ::write(fd, bytes.data(), bytes.size());
+    if (count < 0 && errno == EINTR) continue;
+    if (count < 0) return errno;
+    bytes = bytes.subspan(static_cast<std::size_t>(count));
+  }
+  return 0;
+}
+
+}  // namespace
+
+Result<std::vector<std::uint8_t>> read_file(const std::filesystem::path& path, std::uint64_t max_bytes) {
+  const std::string name = path.string();
+  // O_NONBLOCK: opening a pipe without a writer must not wait for one.
+  const Descriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
+  if (file.get() < 0) {
+    const Status status =
+        errno == ENOENT || errno == ENOTDIR ? Status::kFileMissing : Status::kFileUnreadable;
+    return Error{status, fmt::format("{}: {}", name, std::strerror(errno)), "check the path"};
+  }
+  struct stat info {};
+  if (::fstat(file.get(), &info) != 0)
+    return Error{Status::kFileUnreadable, fmt::format("{}: {}", name, std::strerror(errno)), ""};
+  if (!S_ISREG(info.st_mode))
+    return Error{Status::kFileUnreadable, fmt::format("{}: not a regular file", name), "name a file"};
+  return read_all(file.get(), name, max_bytes);
+}
+
+Result<std::vector<std::uint8_t>> read_stdin(std::uint64_t max_bytes) {
+  return read_all(STDIN_FILENO, "standard input", max_bytes);
+}
+
+Outcome write_file(const std::filesystem::path& path, std::span<const std::uint8_t> bytes) {
+  const auto failed = [&](int code) {
+    return Error{Status::kFileUnwritable, fmt::format("{}: {}", path.string(), std::strerror(code)),
+                 "check the folder, its permissions and the free space"};
+  };
+  if (std::filesystem::is_directory(path)) return failed(EISDIR);
+  std::string temporary = path.string() + ".XXXXXX";
+  Descriptor file(::mkstemp(temporary.data()));
+  if (file.get() < 0) return failed(errno);
+  int code = write_all(file.get(), bytes);
+  const mode_t mask = ::umask(0);  // mkstemp makes private files; the result gets what any new file would
+  ::umask(mask);
+  if (code == 0 && ::fchmod(file.get(), 0666 & ~mask) != 0) code = errno;
+  if (const int close_code = file.close(); code == 0) code = close_code;
+  if (code == 0 && std::rename(temporary.c_str(), path.c_str()) != 0) code = errno;
+  if (code == 0) return Done{};
+  ::unlink(temporary.c_str());
+  return failed(code);
+}
+
+Outcome write_file(const std::filesystem::path& path, const std::string& text) {
+  return write_file(path, std::span(reinterpret_cast<const std::uint8_t*>(text.data()), text.size()));
+}
+
+}  // namespace sqmap::apps

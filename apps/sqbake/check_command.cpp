@@ -1,0 +1,97 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <filesystem>
+#include <memory>
+#include <string>
+
+#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "sqmap/bake/mesh.hpp"
+
+#include "../common/json_text.hpp"
+#include "commands.hpp"
+#include "mesh_options.hpp"
+
+namespace sqmap::apps {
+namespace {
+
+struct CheckArguments {
+  std::filesystem::path input;
+  MeshOptions mesh;
+  std::string format = "text";
+};
+
+std::string text_report(const std::string& input, const bake::SourceMesh& source, const MeshRecord& record) {
+  std::string text = fmt::format(
+      "{}\n"
+      "  as read             {} vertices, {} faces, {} triangles\n"
+      "  repaired            {} vertices, {} triangles in {} component{}\n"
+      "  size                {:.6g} m across, volume {:.6g} m3\n",
+      input, record.source_vertices, source.source_face_count, source.mesh.faces.size(), record.vertices,
+      record.faces, record.components, record.components == 1 ? "" : "s", diagonal_m(source.mesh),
+      record.volume_m3);
+  const auto row = [&](const char* what, std::uint32_t count, const char* meaning) {
+    if (count > 0) text += fmt::format("  {:<19} {} {}\n", what, count, meaning);
+  };
+  row("welded", record.welded_vertices, "vertices that repeat another one's place");
+  row("degenerate", record.degenerate_faces, "faces without area, dropped");
+  row("duplicate", record.duplicate_faces, "faces that repeat another one, dropped");
+  row("flipped", record.flipped_faces, "faces turned to agree with their neighbours and point outwards");
+  row("filled", record.filled_holes, "holes closed");
+  row("open", record.boundary_edges, "edges with one face only");
+  row("non-manifold", record.non_manifold_edges, "edges with more than two faces");
+  text += record.is_closed
+              ? "  closed              yes: every edge has two faces\n"
+              : "  closed              no: inside means a winding number above 1/2, which is vague near "
+                "the holes\n";
+  return text;
+}
+
+Exit run_check(Console& console, const CheckArguments& arguments) {
+  const std::string input = arguments.input.string();
+  const auto refuse = [&](const Error& error) {
+    console.error(message_for(input, error));
+    return exit_for(error.status);
+  };
+  const Result<bake::SourceMesh> source = bake::read_mesh(arguments.input, arguments.mesh.read);
+  if (!source) return refuse(source.error());
+  if (const auto warning = size_warning(source.value().mesh)) console.warning(input + ": " + *warning);
+  const Result<bake::PreparedMesh> prepared = bake::check_and_repair(source.value(), arguments.mesh.repair);
+  if (!prepared) return refuse(prepared.error());
+  const MeshRecord& record = prepared.value().record;
+  if (arguments.format == "text") {
+    console.out(text_report(input, source.value(), record));
+  } else {
+    nlohmann::ordered_json json{{"schema", "sqmap.check/1"},
+                                {"input", input},
+                                {"source_hash", source.value().hash},
+                                {"source_triangles", source.value().mesh.faces.size()},
+                                {"diagonal_m", diagonal_m(source.value().mesh)},
+                                {"mesh", to_json(record)}};
+    console.out(json_text(json));
+  }
+  return Exit::kOk;
+}
+
+}  // namespace
+
+std::function<Exit(Console&)> declare_check(CLI::App& app) {
+  const auto args = std::make_shared<CheckArguments>();
+  app.description(
+      "Reads a mesh as `sqbake bake` would and says what is wrong with it and what repair does about it. "
+      "Writes\n"
+      "nothing.\n"
+      "\n"
+      "Examples:\n"
+      "  sqbake check hand.off\n"
+      "  sqbake check scan.stl --unit mm --repair none --format json\n");
+  app.add_option("INPUT", args->input, "Mesh file")->required();
+  add_mesh_options(app, args->mesh);
+  app.add_option("--format", args->format, "text or json (default text)")
+      ->check(CLI::IsMember({"text", "json"}).description(""))
+      ->type_name("FORMAT");
+  return [args](Console& console) { return run_check(console, *args); };
+}
+
+}  // namespace sqmap::apps

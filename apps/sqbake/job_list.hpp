@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "sqmap/asset/result.hpp"
+
+namespace sqmap::apps {
+
+/// What to bake where, as the command line says it.
+struct JobRequest {
+  std::vector<std::filesystem::path> inputs;  ///< files and folders
+  std::filesystem::path output;               ///< -o; empty when out_dir is used
+  std::filesystem::path out_dir;              ///< --out-dir; empty when output is used
+  bool recursive = false;                     ///< look below folders
+  bool keep_extension = false;                ///< NAME.off.h5 in place of NAME.h5
+  bool force = false;                         ///< overwrite files that are not bundles
+};
+
+struct Job {
+  std::filesystem::path input;
+  std::filesystem::path output;
+  std::string name;           ///< for tables: the file, with its folders below the one that was named
+  std::uint64_t input_bytes;  ///< 0 when unknown
+};
+
+struct JobList {
+  std::vector<Job> jobs;     ///< in order of the command line, each folder sorted by path
+  bool single_file = false;  ///< one file was named: its error is the program's error
+};
+
+/// The jobs of a request. Looks at names and folders only: no mesh is read, nothing is written.
+/// Errors: kBadOption (options that do not fit, two inputs for one output), kFileMissing, kUnknownFormat (a
+/// folder without meshes), kFileUnwritable (an output that is not a bundle of ours, without force).
+Result<JobList> list_jobs(const JobRequest& request);
+
+/// Makes the output folders and checks that they can be written. Errors: kFileUnwritable.
+Outcome prepare_folders(const JobList& list, const JobRequest& request);
+
+}  // namespace sqmap::apps

@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "sqmap/bake/mesh.hpp"
+
+namespace CLI {
+class App;
+}
+
+namespace sqmap::apps {
+
+/// Options that say how to read and repair a mesh, shared by the subcommands.
+struct MeshOptions {
+  bake::ReadOptions read;
+  bake::RepairOptions repair;
+};
+
+/// Adds --unit, --up and --repair. `options` must outlive the parsing.
+void add_mesh_options(CLI::App& app, MeshOptions& options);
+
+/// Diagonal of the bounding box [m]; 0 for a mesh without vertices.
+double diagonal_m(const bake::Mesh& mesh);
+
+/// What looks like a wrong --unit: an object below a millimetre or above a kilometre.
+std::optional<std::string> size_warning(const bake::Mesh& mesh);
+
+}  // namespace sqmap::apps

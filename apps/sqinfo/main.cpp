@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <array>
+
+#include "commands.hpp"
+
+namespace sqmap::apps {
+
+Exit report(Console& console, const std::filesystem::path& file, const Error& error) {
+  console.error(message_for(file.string(), error));
+  return exit_for(error.status);
+}
+
+const char* reason_name(CutReason reason) noexcept {
+  switch (reason) {
+    case CutReason::kWhole:
+      return "whole";
+    case CutReason::kComponent:
+      return "component";
+    case CutReason::kBoundaryStrength:
+      return "boundary-strength";
+    case CutReason::kHyperbolic:
+      return "hyperbolic";
+    case CutReason::kErrorTarget:
+      return "error-target";
+  }
+  return "unknown";
+}
+
+}  // namespace sqmap::apps
+
+namespace {
+
+using sqmap::apps::Command;
+
+constexpr std::array<Command, 5> kCommands{{
+    {"show", "Say what a bundle holds", sqmap::apps::declare_show},
+    {"validate", "Check a bundle against the rules of its format", sqmap::apps::declare_validate},
+    {"query", "Distances and normals for points", sqmap::apps::declare_query},
+    {"export", "Write a 3-D scene, a segmentation or pictures of the maps", sqmap::apps::declare_export},
+    {"diff", "Compare two bundles", sqmap::apps::declare_diff},
+}};
+
+constexpr const char* kExamples =
+    "  sqinfo show hand.h5\n"
+    "  sqinfo validate hand.h5 --level full\n"
+    "  echo 0.1,0.2,0.3 | sqinfo query hand.h5 --points -\n"
+    "  sqinfo export hand.h5 --glb hand.glb --source hand.off\n"
+    "  sqinfo diff old.h5 new.h5 --tolerance 1e-6\n";
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  return sqmap::apps::run({"sqinfo", "Inspects superquadric map bundles.", kExamples, kCommands}, argc, argv);
+}

@@ -1,0 +1,53 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The bounding promise, checked by scripts/check_containment, and that this check can fail."""
+import os
+import subprocess
+import unittest
+
+from support import TIMEOUT_S, FolderTest, run, sphere, write_off
+
+PYTHON = "/usr/bin/python3"
+SCRIPT = os.environ["SQMAP_CHECK_CONTAINMENT"]
+HAS_LIBRARIES = subprocess.run([PYTHON, "-c", "import h5py, numpy"], capture_output=True, check=False).returncode == 0
+
+
+@unittest.skipUnless(HAS_LIBRARIES, "python3-h5py and python3-numpy are not installed")
+class Containment(FolderTest):
+    def bent(self, stretch):
+        vertices, faces = sphere(3)
+        return [(stretch * x, y + x * x, z * (1 + 0.3 * x)) for x, y, z in vertices], faces
+
+    def check(self, bundle, mesh):
+        return subprocess.run([PYTHON, SCRIPT, bundle, mesh], capture_output=True, text=True, timeout=TIMEOUT_S,
+                              check=False)
+
+    def test_every_vertex_is_inside_the_superquadrics_of_its_parts(self):
+        bundle = self.bake(self.bent(3), "bent", "--unit", "cm", "--up", "y", "--max-parts", "6")
+        result = self.check(bundle, self.folder / "bent.off")
+        self.assertEqual(result.returncode, 0, result.stdout + result.stderr)
+        self.assertIn(", 0 outside", result.stdout)
+
+    def test_a_larger_mesh_is_found_to_stick_out(self):
+        bundle = self.bake(self.bent(3), "bent")
+        larger = write_off(self.folder / "larger.off", self.bent(3.1))
+        self.assertEqual(self.check(bundle, larger).returncode, 1)
+
+    def test_another_mesh_is_refused(self):
+        bundle = self.bake(self.bent(3), "bent")
+        other = write_off(self.folder / "other.off", sphere(2))
+        self.assertEqual(self.check(bundle, other).returncode, 4)
+
+
+@unittest.skipUnless(HAS_LIBRARIES and os.environ.get("SQMAP_MESH_DIR"), "SQMAP_MESH_DIR is not set")
+class SampleMeshes(FolderTest):
+    def test_a_real_mesh_is_bounded(self):
+        mesh = os.path.join(os.environ["SQMAP_MESH_DIR"], "elephant.off")
+        bundle = self.folder / "elephant.h5"
+        self.assert_exit(run("sqbake", "bake", mesh, "-o", bundle), 0)
+        result = subprocess.run([PYTHON, SCRIPT, bundle, mesh], capture_output=True, text=True, timeout=TIMEOUT_S,
+                                check=False)
+        self.assertEqual(result.returncode, 0, result.stdout + result.stderr)
+
+
+if __name__ == "__main__":
+    unittest.main()
