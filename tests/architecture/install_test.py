@@ -1,0 +1,83 @@
+# SPDX-License-Identifier: Apache-2.0
+"""sqmap serves an outside project: installed, with and without HDF5, also after the installation has been moved; and
+as a folder of that project.
+
+Usage: install_test.py BUILD_DIR SOURCE_DIR CXX_COMPILER [BUNDLE]    (no bundle: sqmap was built without io)
+"""
+import os
+import subprocess
+import sys
+import tempfile
+
+import link_probe_test
+
+
+HERE = os.path.dirname(os.path.abspath(__file__))
+PROBE = os.path.join(HERE, "link_probe.cpp")
+SAMPLE = os.path.join(HERE, "..", "..", "samples", "query_bundle.cpp")
+
+
+def run(*command, expected=0, **options):
+    result = subprocess.run(command, capture_output=True, text=True, check=False, **options)
+    if result.returncode != expected:
+        sys.exit(f"{' '.join(command)}\nended with {result.returncode}\n{result.stdout}{result.stderr}")
+    return " ".join((result.stdout + result.stderr).split())  # CMake wraps its messages
+
+
+def configure(prefix, work, source, compiler, components, *defines, expected=0):
+    return run("cmake", "-S", os.path.join(HERE, "consumer"), "-B", work, f"-DCMAKE_PREFIX_PATH={prefix}",
+               f"-DCMAKE_CXX_COMPILER={compiler}", "-DCMAKE_BUILD_TYPE=Release", f"-DSOURCE={source}",
+               f"-DCOMPONENTS={components}", "-DLANGUAGES=CXX", *defines, expected=expected)
+
+
+def build_consumer(*arguments):
+    configure(*arguments)
+    run("cmake", "--build", arguments[1])
+    return os.path.join(arguments[1], "consumer")
+
+
+def check_prefix(prefix, work, compiler, bundle):
+    """Both components, built against the installation at prefix."""
+    link_probe_test.main(build_consumer(prefix, os.path.join(work, "runtime"), PROBE, compiler, "runtime",
+                                        "-DCMAKE_DISABLE_FIND_PACKAGE_HDF5=ON"))
+    if bundle:
+        sample = build_consumer(prefix, os.path.join(work, "io"), SAMPLE, compiler, "runtime;io", "-DLANGUAGES=C;CXX")
+        answer = run(sample, bundle, input="0.3 0 0\n")
+        assert "distance -0.100" in answer, f"{answer!r}: the point lies 0.1 m inside the ball"
+    else:
+        text = configure(prefix, os.path.join(work, "io"), PROBE, compiler, "runtime;io", expected=1)
+        assert "without its component io" in text, text
+
+
+def names_folder(prefix, folders):
+    """Package files that name a folder of this machine: such an installation cannot be moved."""
+    for folder, _, names in os.walk(os.path.join(prefix, "lib")):
+        for name in names:
+            if name.endswith(".cmake"):
+                with open(os.path.join(folder, name), encoding="utf-8") as file:
+                    text = file.read()
+                yield from (f"{name} names {path}" for path in folders if path in text)
+
+
+def main(build_dir, source_dir, compiler, bundle=None):
+    with tempfile.TemporaryDirectory() as work:
+        first, second = os.path.join(work, "first"), os.path.join(work, "moved", "away")
+        run("cmake", "--install", build_dir, "--prefix", first)
+        absolute = list(names_folder(first, (first, build_dir, source_dir, "/usr/lib/")))
+        assert not absolute, absolute
+        if bundle:
+            for program in ("sqbake", "sqinfo"):
+                run(os.path.join(first, "bin", program), "--version")
+        check_prefix(first, os.path.join(work, "a"), compiler, bundle)
+        if bundle:
+            text = configure(first, os.path.join(work, "no_c"), SAMPLE, compiler, "runtime;io", expected=1)
+            assert "add C to project" in text, text
+        os.makedirs(os.path.dirname(second))
+        os.rename(first, second)
+        check_prefix(second, os.path.join(work, "b"), compiler, bundle)
+        link_probe_test.main(build_consumer("", os.path.join(work, "c"), PROBE, compiler, "runtime",
+                                            f"-DSQMAP_SOURCE_DIR={source_dir}"))
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])
