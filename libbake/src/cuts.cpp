@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <numbers>
 #include <queue>
@@ -12,14 +13,16 @@
 #include "min_cut.hpp"
 
 namespace sqmap::bake {
-double tune(const char* name, double value);
 namespace {
 
-// Half width of the band a border may move in, relative to the border's radius.
-const double kBandWidth = tune("BAND", 1.5), kMinBand = tune("MINBAND", 0.03);
-// Price of an edge: exp(-kConcavityGain x) of its length, x = -k_min times the border's radius, within these bounds.
-const double kConcavityGain = tune("GAIN", 2);
-const double kMostConvex = tune("MCX", -1), kMostConcave = tune("MCC", 2.0);
+// Half width of the band a border may move in: in radii of the border, but not narrower than a few edges of the working
+// mesh, nor so wide that a waist would slide along the trunk.
+constexpr double kBandRadii = 1.5, kMinBand = 0.03, kMaxBand = 0.08;
+// Price of an edge: exp(-kConcavityGain x) of its length, x = minus the curvature across it times the border's radius,
+// within these bounds.
+constexpr double kConcavityGain = 2, kMostConvex = -1, kMostConcave = 2;
+// A side that sticks out like a limb ten times as long as thick has the full strength of its border.
+constexpr double kFullProtrusion = 20;
 // Integer units of capacity per unit of length (the whole surface has area 1).
 constexpr double kCapacityUnits = 1e9;
 
@@ -66,6 +69,11 @@ double protrusion_ratio(double area, double length2) {
   return length2 > 0 ? 4 * std::numbers::pi * area / length2 : 0;
 }
 
+double border_strength(const Border& border, double area) {
+  const double protrusion = std::log(std::max(1.0, protrusion_ratio(area, border.length2)));
+  return border.concavity * std::min(1.0, protrusion / std::log(kFullProtrusion));
+}
+
 Border measure_border(const Surface& surface, std::span<const double> link_bend,
                       std::span<const std::uint32_t> links) {
   Border border;
@@ -97,7 +105,7 @@ std::vector<std::uint8_t> refine_border(const Surface& surface, std::span<const 
   double length = 0;
   for (const Link& link : surface.links)
     if (side[link.face[0]] != side[link.face[1]]) length += link.length;
-  const double radius = length / (2 * std::numbers::pi), limit = std::clamp(kBandWidth * radius, kMinBand, tune("MAXBAND", 0.08));
+  const double radius = length / (2 * std::numbers::pi), limit = std::clamp(kBandRadii * radius, kMinBand, kMaxBand);
   const std::vector<double> distance = border_distance(surface, side, limit);
 
   // Nodes: the faces of the band, then the two terminals, which stand for all faces beyond the band.

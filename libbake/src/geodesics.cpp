@@ -7,6 +7,7 @@
 #include <limits>
 #include <memory>
 #include <queue>
+#include <unordered_map>
 
 #include <tbb/parallel_for.h>
 
@@ -165,6 +166,28 @@ std::vector<double> vertex_protrusion(const Surface& surface, std::span<const So
     for (std::size_t v = 0; v < protrusion.size(); ++v)
       protrusion[v] += sources[i].area * static_cast<double>(distances[i][v]);
   return protrusion;
+}
+
+bool is_largest_within(const Surface& surface, std::span<const double> value, std::uint32_t vertex, double window) {
+  std::unordered_map<std::uint32_t, float> distance{{vertex, 0.0F}};
+  MinQueue queue;
+  queue.emplace(0.0F, vertex);
+  while (!queue.empty()) {
+    const auto [d, v] = queue.top();
+    queue.pop();
+    if (d > distance[v]) continue;
+    if (value[v] > value[vertex] || (value[v] == value[vertex] && v < vertex)) return false;
+    for (const std::uint32_t f : surface.faces_of_vertex[v])
+      for (const std::uint32_t w : surface.faces[f]) {
+        const auto via = static_cast<float>(d + norm(surface.points[w] - surface.points[v]));
+        if (!(via < window)) continue;
+        const auto [entry, is_new] = distance.try_emplace(w, via);
+        if (!is_new && !(via < entry->second)) continue;
+        entry->second = via;
+        queue.emplace(via, w);
+      }
+  }
+  return true;
 }
 
 std::vector<double> face_means(const Surface& surface, std::span<const double> at_vertices) {

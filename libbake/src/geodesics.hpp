@@ -33,6 +33,9 @@ std::vector<float> fast_marching(const Surface& surface, std::span<const std::ui
 std::vector<double> vertex_protrusion(const Surface& surface, std::span<const Source> sources,
                                       std::span<const std::vector<float>> distances);
 
+/// True when no vertex within `window` (along edges) of `vertex` has a larger value, nor an equal one and a lower index.
+bool is_largest_within(const Surface& surface, std::span<const double> value, std::uint32_t vertex, double window);
+
 /// Mean of the three vertex values of each face; shape [faces].
 std::vector<double> face_means(const Surface& surface, std::span<const double> at_vertices);
 

@@ -19,6 +19,7 @@ namespace {
 constexpr std::size_t kHullPoints = 400;
 // Planes tried along each axis, at these shares of the cell's surface.
 constexpr std::array<double, 7> kQuantiles{0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8};
+constexpr std::array<double, 3> kNextQuantiles{0.3, 0.5, 0.7};
 
 Vec3d centroid(const SolidSet& set, const std::array<std::uint32_t, 3>& t) {
   return (1.0 / 3) * (set.vertices_m[t[0]] + set.vertices_m[t[1]] + set.vertices_m[t[2]]);
@@ -52,18 +53,68 @@ std::array<Vec3d, 3> principal_axes(const SolidSet& set, const Solid& solid) {
   return axes;
 }
 
-double hull_volume_m3(const SolidSet& set, const Solid& solid, const std::vector<bool>& first_side,
-                      bool side) {
+double hull_volume_m3(const SolidSet& set, const Solid& solid) {
   std::vector<std::uint32_t> ids;
-  for (std::size_t k = 0; k < solid.triangles.size(); ++k) {
-    if (first_side[k] == side) ids.insert(ids.end(), solid.triangles[k].begin(), solid.triangles[k].end());
-  }
+  for (const auto& t : solid.triangles) ids.insert(ids.end(), t.begin(), t.end());
   std::sort(ids.begin(), ids.end());
   ids.erase(std::unique(ids.begin(), ids.end()), ids.end());
   const std::size_t stride = std::max<std::size_t>(1, ids.size() / kHullPoints);
   std::vector<Vec3d> points;
   for (std::size_t k = 0; k < ids.size(); k += stride) points.push_back(set.vertices_m[ids[k]]);
   return convex_hull(points).volume_m3;
+}
+
+struct Cut {
+  std::vector<bool> first_side;                                ///< empty: the plane does not cut
+  double volume_m3 = std::numeric_limits<double>::infinity();  ///< of the hulls of both sides
+};
+
+/// The triangles on one side of a cut, its caps left open: enough for a hull.
+Solid side_of(const Solid& solid, const Cut& cut, bool first) {
+  Solid side;
+  for (std::size_t k = 0; k < solid.triangles.size(); ++k) {
+    if (cut.first_side[k] != first) continue;
+    side.triangles.push_back(solid.triangles[k]);
+    side.face.push_back(solid.face[k]);
+  }
+  return side;
+}
+
+/// Cuts at each quantile along each principal axis, axis by axis.
+std::vector<Cut> plane_cuts(const SolidSet& set, const Solid& solid, std::span<const double> quantiles) {
+  std::size_t mesh_triangles = 0;
+  for (const std::uint32_t face : solid.face) mesh_triangles += face != kNewFace;
+  if (mesh_triangles < 2) return {};
+  const std::array<Vec3d, 3> axes = principal_axes(set, solid);
+  std::vector<Cut> cuts(axes.size() * quantiles.size());
+  tbb::parallel_for(std::size_t{0}, cuts.size(), [&](std::size_t c) {
+    const Vec3d& axis = axes[c / quantiles.size()];
+    std::vector<double> height(solid.triangles.size());
+    for (std::size_t k = 0; k < height.size(); ++k) height[k] = dot(axis, centroid(set, solid.triangles[k]));
+    const auto [low, high] = std::minmax_element(height.begin(), height.end());
+    const double at = *low + quantiles[c % quantiles.size()] * (*high - *low);
+    Cut cut;
+    cut.first_side.resize(height.size());
+    std::size_t below = 0;
+    for (std::size_t k = 0; k < height.size(); ++k) {
+      cut.first_side[k] = height[k] < at;
+      below += cut.first_side[k] && solid.face[k] != kNewFace;
+    }
+    if (below == 0 || below == mesh_triangles) return;
+    cut.volume_m3 =
+        hull_volume_m3(set, side_of(solid, cut, true)) + hull_volume_m3(set, side_of(solid, cut, false));
+    cuts[c] = std::move(cut);
+  });
+  return cuts;
+}
+
+bool encloses_less(const Cut& a, const Cut& b) { return a.volume_m3 < b.volume_m3; }
+
+/// Hull volume of a side, or of its halves where cutting it once more encloses less.
+double volume_after_next_cut_m3(const SolidSet& set, const Solid& side) {
+  double least = hull_volume_m3(set, side);
+  for (const Cut& cut : plane_cuts(set, side, kNextQuantiles)) least = std::min(least, cut.volume_m3);
+  return least;
 }
 
 }  // namespace
@@ -102,36 +153,23 @@ std::vector<Cell> close_segments(SolidSet& set, const Solid& whole, const Decomp
 }
 
 std::optional<std::vector<bool>> best_plane_cut(const SolidSet& set, const Solid& solid) {
-  std::size_t mesh_triangles = 0;
-  for (const std::uint32_t face : solid.face) mesh_triangles += face != kNewFace;
-  if (mesh_triangles < 2) return std::nullopt;
-
-  const std::array<Vec3d, 3> axes = principal_axes(set, solid);
-  struct Candidate {
-    std::vector<bool> first_side;
-    double volume_m3 = std::numeric_limits<double>::infinity();
-  };
-  std::vector<Candidate> candidates(axes.size() * kQuantiles.size());
-  tbb::parallel_for(std::size_t{0}, candidates.size(), [&](std::size_t c) {
-    const Vec3d& axis = axes[c / kQuantiles.size()];
-    std::vector<double> height(solid.triangles.size());
-    for (std::size_t k = 0; k < height.size(); ++k) height[k] = dot(axis, centroid(set, solid.triangles[k]));
-    const auto [low, high] = std::minmax_element(height.begin(), height.end());
-    const double cut = *low + kQuantiles[c % kQuantiles.size()] * (*high - *low);
-    std::vector<bool> side(height.size());
-    std::size_t below = 0;
-    for (std::size_t k = 0; k < height.size(); ++k) {
-      side[k] = height[k] < cut;
-      below += side[k] && solid.face[k] != kNewFace;
+  std::vector<Cut> cuts = plane_cuts(set, solid, kQuantiles);
+  // The best of each axis is judged by what one more cut of both sides leaves. Halving a ring across gains
+  // nothing at once and much at the next cut; slicing it flat gains nothing at either.
+  const Cut* best = nullptr;
+  double least_m3 = std::numeric_limits<double>::infinity();
+  for (std::size_t begin = 0; begin < cuts.size(); begin += kQuantiles.size()) {
+    const auto first = cuts.begin() + static_cast<std::ptrdiff_t>(begin);
+    const Cut& cut = *std::min_element(first, first + kQuantiles.size(), encloses_less);
+    if (cut.first_side.empty()) continue;
+    const double volume_m3 = volume_after_next_cut_m3(set, side_of(solid, cut, true)) +
+                             volume_after_next_cut_m3(set, side_of(solid, cut, false));
+    if (best == nullptr || volume_m3 < least_m3) {
+      best = &cut;
+      least_m3 = volume_m3;
     }
-    if (below == 0 || below == mesh_triangles) return;
-    candidates[c].volume_m3 =
-        hull_volume_m3(set, solid, side, true) + hull_volume_m3(set, solid, side, false);
-    candidates[c].first_side = std::move(side);
-  });
-  const auto best = std::min_element(candidates.begin(), candidates.end(),
-                                     [](const auto& a, const auto& b) { return a.volume_m3 < b.volume_m3; });
-  if (best->first_side.empty()) return std::nullopt;
+  }
+  if (best == nullptr) return std::nullopt;
   return best->first_side;
 }
 

@@ -3,15 +3,12 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
-#include <cstdlib>
 #include <map>
 
 #include "components.hpp"
 #include "convexity.hpp"
 
 namespace sqmap::bake {
-double tune(const char* name, double value);
 namespace {
 
 constexpr std::uint32_t kNone = 0xFFFFFFFF;
@@ -119,51 +116,62 @@ bool merge_flattest(const Surface& surface, std::span<const double> link_bend, d
 
 }  // namespace
 
+Segmentation one_segment(std::size_t face_count) {
+  return {std::vector<std::uint32_t>(face_count, 0), {CutReason::kWhole}};
+}
+
+Rows faces_of_segments(const Segmentation& segmentation) {
+  std::vector<std::array<std::uint32_t, 2>> pairs;
+  pairs.reserve(segmentation.label.size());
+  for (std::uint32_t f = 0; f < segmentation.label.size(); ++f) pairs.push_back({segmentation.label[f], f});
+  return group_rows(segmentation.reasons.size(), pairs);
+}
+
 int apply_cut(const Surface& surface, std::span<const double> link_bend, std::span<const std::uint8_t> side,
               const CutRules& rules, CutReason reason, Segmentation& segmentation) {
-  const std::size_t segment_count = segmentation.reasons.size();
-  std::vector<double> inside(segment_count, 0), outside(segment_count, 0);
-  for (std::size_t f = 0; f < surface.faces.size(); ++f)
-    (side[f] ? inside : outside)[segmentation.label[f]] += surface.area[f];
+  const Rows faces = faces_of_segments(segmentation);
+  const auto segment_count = static_cast<std::uint32_t>(segmentation.reasons.size());
   std::vector<std::vector<std::uint32_t>> new_border(segment_count);
   for (std::uint32_t i = 0; i < surface.links.size(); ++i) {
     const auto [a, b] = surface.links[i].face;
     if (side[a] != side[b] && segmentation.label[a] == segmentation.label[b])
       new_border[segmentation.label[a]].push_back(i);
   }
-  std::vector<std::uint32_t> split(segment_count, kNone);
   int count = 0;
-  for (std::size_t s = 0; s < segment_count; ++s) {
-    const double smaller = std::min(inside[s], outside[s]);
-    if (smaller < rules.min_area) continue;
-    const Border border = measure_border(surface, link_bend, new_border[s]);
-    if (border.concavity < rules.min_concavity) continue;
-    if (protrusion_ratio(smaller, border.length2) < rules.min_protrusion) continue;
-    std::array<std::vector<std::uint32_t>, 3> faces;  // outside, inside, all
-    for (std::uint32_t f = 0; f < surface.faces.size(); ++f)
-      if (segmentation.label[f] == s) {
-        faces[side[f]].push_back(f);
-        faces[2].push_back(f);
-      }
-    const double gain = 1 - (hull_volume(surface, faces[0]) + hull_volume(surface, faces[1])) / hull_volume(surface, faces[2]);
-    if (std::getenv("VERBOSE")) std::fprintf(stderr, "  gain %.3f conc %.3f prot %.2f area %.3f of %.3f\n", gain, border.concavity, protrusion_ratio(smaller, border.length2), smaller, inside[s]+outside[s]);
-    if (gain < tune("GAINMIN", 0.05) && border.concavity * std::min(1.0, std::log(std::max(1.0, protrusion_ratio(smaller, border.length2))) / 3) < tune("STRONG", 0.3)) continue;
-    split[s] = static_cast<std::uint32_t>(segmentation.reasons.size());
+  for (std::uint32_t s = 0; s < segment_count; ++s) {
+    if (new_border[s].empty()) continue;
+    std::array<std::vector<std::uint32_t>, 2> piece;
+    std::array<double, 2> area{};
+    for (const std::uint32_t f : faces[s]) {
+      piece[side[f]].push_back(f);
+      area[side[f]] += surface.area[f];
+    }
+    const double smaller = std::min(area[0], area[1]);
+    if (!(smaller >= rules.min_area)) continue;
+    const double strength = border_strength(measure_border(surface, link_bend, new_border[s]), smaller);
+    if (!(strength >= rules.min_strength)) continue;
+    if (strength < rules.proven_strength &&
+        hull_volume(surface, piece[0]) + hull_volume(surface, piece[1]) >
+            (1 - rules.min_hull_gain) * hull_volume(surface, faces[s]))
+      continue;
+    for (const std::uint32_t f : piece[1]) segmentation.label[f] = static_cast<std::uint32_t>(segmentation.reasons.size());
+    segmentation.reasons[s] = reason;
     segmentation.reasons.push_back(reason);
-    if (segmentation.reasons[s] == CutReason::kWhole) segmentation.reasons[s] = reason;
     ++count;
   }
-  for (std::size_t f = 0; f < surface.faces.size(); ++f)
-    if (side[f] && split[segmentation.label[f]] != kNone) segmentation.label[f] = split[segmentation.label[f]];
   return count;
 }
 
-void tidy(const Surface& surface, std::span<const double> link_bend, const CutRules& rules,
-          Segmentation& segmentation) {
+void join_small_pieces(const Surface& surface, double min_area, Segmentation& segmentation) {
   split_pieces(surface, segmentation);
-  while (join_small(surface, rules.min_area, segmentation)) split_pieces(surface, segmentation);
-  while (merge_flattest(surface, link_bend, rules.min_concavity, segmentation)) split_pieces(surface, segmentation);
-  if (segmentation.reasons.size() == 1) segmentation.reasons.assign(1, CutReason::kWhole);
+  while (join_small(surface, min_area, segmentation)) split_pieces(surface, segmentation);
+  if (segmentation.reasons.size() == 1) segmentation.reasons[0] = CutReason::kWhole;
+}
+
+void merge_over_flat_borders(const Surface& surface, std::span<const double> link_bend, double min_concavity,
+                             Segmentation& segmentation) {
+  while (merge_flattest(surface, link_bend, min_concavity, segmentation)) split_pieces(surface, segmentation);
+  if (segmentation.reasons.size() == 1) segmentation.reasons[0] = CutReason::kWhole;
 }
 
 }  // namespace sqmap::bake
