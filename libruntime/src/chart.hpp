@@ -8,6 +8,7 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <utility>
 #include <vector>
 
 #include "sqmap/asset/asset.hpp"
@@ -31,9 +32,12 @@ struct ChartAnswer {
   T distance_m = std::numeric_limits<T>::infinity();  ///< to the represented surface; infinite: not eligible
   Vec3<T> surface_m;                                  ///< nearest point found on it
   Vec3<T> normal;                                     ///< outward unit normal there
+  T row{}, col{};                                     ///< layer 3: where on the map
   bool behind_first{};  ///< layer 2: the nearest crossing is not the first of its ray
   bool leaving{};       ///< layer 2: the ray leaves the material there
-  bool faces_patch{};   ///< layer 3: the nearest point lies within the represented surface, not on its rim
+  T offset_m{};  ///< delta of QueryOptions::edge_length_m for the edge length asked for; 0 on flat and hollow
+                 ///< surface
+  bool faces_patch{};  ///< layer 3: the nearest point lies within the represented surface, not on its rim
 };
 
 template <class T>
@@ -73,8 +77,10 @@ class Chart {
   }
   Vec3<T> normal_at(const Vec3<T>& p_part_m) const noexcept { return sqmap::normal_at(shape_, p_part_m); }
 
-  /// Layers 2 and 3 for a point inside the superquadric.
-  ChartAnswer<T> look(const Vec3<T>& p_part_m, bool third_layer, std::uint32_t level) const noexcept;
+  /// Layers 2 and 3 for a point inside the superquadric. edge_m > 0: also the offset for faces with such
+  /// edges.
+  ChartAnswer<T> look(const Vec3<T>& p_part_m, bool third_layer, std::uint32_t level,
+                      T edge_m = T(0)) const noexcept;
 
   std::size_t bytes() const noexcept {
     return sizeof(*this) + table_.bytes() + map_.code.capacity() * sizeof(map_.code[0]) +
@@ -111,6 +117,9 @@ class Chart {
   ChartAnswer<T> second_layer(const Foot<T>& foot, std::uint32_t stride) const noexcept;
   void third_layer(const Vec3<T>& p, const Foot<T>& foot, std::uint32_t stride,
                    ChartAnswer<T>& answer) const noexcept;
+  /// Largest convex curvature of the represented surface around (row, col) [1/m], at the resolution of the
+  /// cells; 0 where it is flat or hollow.
+  T convex_curvature(T row, T col, std::uint32_t stride) const noexcept;
   void vertex_fan(const Vec3<T>& p, const Cell& cell, ChartAnswer<T>& answer) const noexcept;
 
   SuperquadricOf<T> shape_;
@@ -159,7 +168,8 @@ typename Chart<T>::Patch Chart<T>::patch_at(const Cell& cell, T row, T col,
 }
 
 template <class T>
-ChartAnswer<T> Chart<T>::look(const Vec3<T>& p_part_m, bool third, std::uint32_t level) const noexcept {
+ChartAnswer<T> Chart<T>::look(const Vec3<T>& p_part_m, bool third, std::uint32_t level,
+                              T edge_m) const noexcept {
   const std::uint32_t stride = stride_at(level);
   const Foot<T> foot = table_.foot(p_part_m);
   ChartAnswer<T> answer = second_layer(foot, stride);
@@ -169,7 +179,40 @@ ChartAnswer<T> Chart<T>::look(const Vec3<T>& p_part_m, bool third, std::uint32_t
     // A second sheet behind the first has no patch of its own: its ray distance stands where it is nearer.
     if (!answer.behind_first || refined.distance_m < answer.distance_m) answer = refined;
   }
+  if (edge_m > T(0) && std::isfinite(answer.distance_m)) {
+    const T row = third ? answer.row : foot.row, col = third ? answer.col : foot.col;
+    const T bend = edge_m * convex_curvature(row, col, stride);  // L / rho
+    answer.offset_m = edge_m * bend / (T(3) * (T(1) + std::sqrt(T(1) + bend * bend / T(3))));
+  }
   return answer;
+}
+
+template <class T>
+T Chart<T>::convex_curvature(T row, T col, std::uint32_t stride) const noexcept {
+  // Differences between the centres of neighbouring cells, so that a crease between two cells counts as well.
+  struct Centre {
+    Vec3<T> point_m, normal;
+    bool eligible;
+  };
+  const T turn = T(map_.cols);
+  const auto centre_at = [&](T r, T c) {
+    const Cell cell = cell_at(r, c < T(0) ? c + turn : c < turn ? c : c - turn, stride);
+    const T half = T(stride) / T(2), mid_row = T(cell.row) + half, mid_col = T(cell.col) + half;
+    return Centre{patch_at(cell, mid_row, mid_col, stride).point_m,
+                  patch_normal(cell, mid_row, mid_col, stride), cell.eligible};
+  };
+  const T step = T(stride);
+  T most = 0;
+  const Centre here = centre_at(row, col);
+  const T last = T(map_.rows - 1) - T(0.5);
+  for (const auto& [dr, dc] : {std::pair{step, T(0)}, {-step, T(0)}, {T(0), step}, {T(0), -step}}) {
+    const Centre there = centre_at(std::clamp(row + dr, T(0), last), col + dc);
+    const Vec3<T> d = there.point_m - here.point_m;
+    const T square = dot(d, d);
+    if (!there.eligible || !(square > T(0))) continue;
+    most = std::max(most, dot(there.normal - here.normal, d) / square);
+  }
+  return most;
 }
 
 template <class T>
@@ -295,6 +338,8 @@ void Chart<T>::third_layer(const Vec3<T>& p, const Foot<T>& foot, std::uint32_t 
   answer.distance_m = std::sqrt(best_square);
   answer.surface_m = best_point_m;
   answer.faces_patch = !best_on_rim;
+  answer.row = best_row;
+  answer.col = best_col;
   answer.normal = patch_normal(best_cell, best_row, best_col, stride);
   if (stride == 1) vertex_fan(p, best_cell, answer);
 }

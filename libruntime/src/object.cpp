@@ -75,6 +75,7 @@ Answer Object::query(const Vec3f& p_m, const QueryOptions& options) const noexce
   float nearest_m = std::numeric_limits<float>::infinity();
   float sharpest = -1;
   bool nearest_inside = false, nearest_faces = false;
+  float offset_m = 0;
   float nearest_certainty = 0;
   for (std::size_t k = 0; k < impl_->charts.size(); ++k) {
     const Chart<float>& chart = impl_->charts[k];
@@ -89,7 +90,8 @@ Answer Object::query(const Vec3f& p_m, const QueryOptions& options) const noexce
       answer.normal = chart.to_object_direction(chart.normal_at(p_part_m));
       return answer;
     }
-    const ChartAnswer<float> here = chart.look(p_part_m, layer == Layer::kThree, options.level);
+    const ChartAnswer<float> here =
+        chart.look(p_part_m, layer == Layer::kThree, options.level, options.edge_length_m);
     if (here.certainty > sharpest) {
       sharpest = here.certainty;
       answer.inside = here.inside;
@@ -101,12 +103,14 @@ Answer Object::query(const Vec3f& p_m, const QueryOptions& options) const noexce
       answer.normal = chart.to_object_direction(here.normal);
       answer.surface_m = chart.to_object(here.surface_m);
       nearest_faces = here.faces_patch;
+      offset_m = here.offset_m;
       nearest_inside = here.inside;
       nearest_certainty = here.certainty;
     }
   }
   if (nearest_faces && sharpest < kOverrule * nearest_certainty) answer.inside = nearest_inside;
-  if (std::isfinite(nearest_m)) answer.signed_distance_m = answer.inside ? -nearest_m : nearest_m;
+  if (std::isfinite(nearest_m))
+    answer.signed_distance_m = (answer.inside ? -nearest_m : nearest_m) - offset_m;
   return answer;
 }
 

@@ -78,8 +78,8 @@ TEST(Object, CoarseLevelAnswersLikeTheCoarseMap) {
   for (int i = 0; i < 500; ++i) {
     const Vec3f p = cast<float>(kCentre + 0.75 * random_direction(rng));
     for (const Layer layer : {Layer::kTwo, Layer::kThree}) {
-      EXPECT_NEAR(pyramid.query(p, {layer, 2}).signed_distance_m,
-                  coarse.query(p, {layer, 0}).signed_distance_m, 2e-3);
+      EXPECT_NEAR(pyramid.query(p, {.layer = layer, .level = 2}).signed_distance_m,
+                  coarse.query(p, {.layer = layer, .level = 0}).signed_distance_m, 2e-3);
     }
   }
 }
@@ -189,6 +189,37 @@ TEST(Object, CrossingASeamKeepsTheDepth) {
   // Cells that a seam passes through hold no patch; half a cell beside the seam the depth is to the nearest
   // rim.
   EXPECT_LE(off, counted / 100) << "depth jumps at the seam";
+}
+
+TEST(Object, OffsetKeepsFacesOutThatTheirCornersMiss) {
+  const Object object = built(test::ball_in_ellipsoid(kRadius, 65, 128));
+  constexpr float kEdge = 0.4F;
+  std::mt19937_64 rng(12);
+  double deepest_plain = 0, deepest_offset = 0;
+  for (int i = 0; i < 300; ++i) {
+    // An equilateral face over the ball, lowered until its first corner is at distance 0.
+    const Vec3d n = random_direction(rng), u = normalized(cross(n, random_direction(rng))), v = cross(n, u);
+    for (const float edge : {0.0F, kEdge}) {
+      double height = kRadius + 0.05;
+      const auto corner = [&](int k) {
+        const double turn = k * 2 * 3.14159265358979 / 3;
+        return kCentre + height * n + kEdge / std::sqrt(3.0) * (std::cos(turn) * u + std::sin(turn) * v);
+      };
+      const auto touches = [&] {
+        for (int k = 0; k < 3; ++k) {
+          const Answer answer = object.query(cast<float>(corner(k)),
+                                             {.layer = Layer::kThree, .level = 0, .edge_length_m = edge});
+          if (answer.signed_distance_m <= 0) return true;
+        }
+        return false;
+      };
+      while (!touches() && height > 0.5) height -= 1e-3;
+      double& deepest = edge > 0 ? deepest_offset : deepest_plain;
+      deepest = std::max(deepest, kRadius - height);  // how far the face's middle is inside the ball
+    }
+  }
+  EXPECT_GT(deepest_plain, 0.02) << "corners alone let the face cut the ball";
+  EXPECT_LT(deepest_offset, 0.006);
 }
 
 TEST(Object, BatchEqualsSinglePointsAndWritesOnlyWhatIsWanted) {

@@ -42,7 +42,7 @@ class [[nodiscard]] Result {
   /// The value. Precondition: ok().
   T& value() & noexcept { return *std::get_if<T>(&state_); }
   const T& value() const& noexcept { return *std::get_if<T>(&state_); }
-  T&& value() && noexcept { return std::move(*std::get_if<T>(&state_)); }
+  T value() && noexcept { return std::move(*std::get_if<T>(&state_)); }
   /// The error. Precondition: !ok().
   const Error& error() const noexcept { return *std::get_if<Error>(&state_); }
 

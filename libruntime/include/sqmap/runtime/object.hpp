@@ -26,6 +26,17 @@ inline constexpr double kLayerThreshold = 10;
 struct QueryOptions {
   Layer layer = Layer::kAuto;
   std::uint32_t level = 0;  ///< pyramid level, 0 the finest; levels beyond a part's coarsest use its coarsest
+  /// Longest edge L of the triangles whose corners are the points [m]; 0: the points stand for themselves. A
+  /// face can cut a convex feature that all its corners miss (paper eq. 12). With L > 0 signed distances are
+  /// less by
+  ///
+  ///     delta = sqrt(rho^2 + L^2/3) - rho
+  ///
+  /// with rho the radius of convex curvature near the foot point, so that a face whose corners are at >= 0
+  /// stays outside a ball of radius rho: L/sqrt(3) at a spike, 0 on flat and hollow surface. (The paper's
+  /// delta follows the gradient of D at its minima, where that vanishes.) Creases count as bent over one cell
+  /// of the map. `inside` is not affected.
+  float edge_length_m = 0;
 };
 
 inline constexpr std::uint32_t kNowhere = 0xFFFFFFFF;
