@@ -28,7 +28,8 @@ std::vector<Vec3d> directions() {
 double hull_volume(const Surface& surface, std::span<const std::uint32_t> faces) {
   static const std::vector<Vec3d> kDirections = directions();
   std::vector<std::uint32_t> vertices;
-  for (const std::uint32_t f : faces) vertices.insert(vertices.end(), surface.faces[f].begin(), surface.faces[f].end());
+  for (const std::uint32_t f : faces)
+    vertices.insert(vertices.end(), surface.faces[f].begin(), surface.faces[f].end());
   std::sort(vertices.begin(), vertices.end());
   vertices.erase(std::unique(vertices.begin(), vertices.end()), vertices.end());
   std::vector<double> farthest(kDirections.size(), -std::numeric_limits<double>::infinity());

@@ -7,8 +7,8 @@
 
 namespace sqmap::bake {
 
-/// Edge-based curvature tensor of Cohen-Steiner and Morvan 2003: over all edges of a window, the sum of length times bend
-/// times the projector on the edge, over the window's area. Symmetric.
+/// Edge-based curvature tensor of Cohen-Steiner and Morvan 2003: over all edges of a window, the sum of
+/// length times bend times the projector on the edge, over the window's area. Symmetric.
 struct BendTensor {
   double xx{}, yy{}, zz{}, xy{}, xz{}, yz{};
 
@@ -41,8 +41,8 @@ struct Curvature {
   std::vector<BendTensor> bend;  ///< shape [points]
 };
 
-/// Both curvatures over connected windows of the given radius. Boundary vertices have no deficit, no bend and count no
-/// area. On a surface without concave edges nothing bends negatively, whatever its triangles.
+/// Both curvatures over connected windows of the given radius. Boundary vertices have no deficit, no bend and
+/// count no area. On a surface without concave edges nothing bends negatively, whatever its triangles.
 Curvature curvature(const Surface& surface, double radius);
 
 }  // namespace sqmap::bake

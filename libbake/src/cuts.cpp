@@ -15,11 +15,11 @@
 namespace sqmap::bake {
 namespace {
 
-// Half width of the band a border may move in: in radii of the border, but not narrower than a few edges of the working
-// mesh, nor so wide that a waist would slide along the trunk.
+// Half width of the band a border may move in: in radii of the border, but not narrower than a few edges of
+// the working mesh, nor so wide that a waist would slide along the trunk.
 constexpr double kBandRadii = 1.5, kMinBand = 0.03, kMaxBand = 0.08;
-// Price of an edge: exp(-kConcavityGain x) of its length, x = minus the curvature across it times the border's radius,
-// within these bounds.
+// Price of an edge: exp(-kConcavityGain x) of its length, x = minus the curvature across it times the
+// border's radius, within these bounds.
 constexpr double kConcavityGain = 2, kMostConvex = -1, kMostConcave = 2;
 // A side that sticks out like a limb ten times as long as thick has the full strength of its border.
 constexpr double kFullProtrusion = 20;
@@ -27,7 +27,8 @@ constexpr double kFullProtrusion = 20;
 constexpr double kCapacityUnits = 1e9;
 
 // Dual-graph distance of each face from the border, where below `limit`; infinity elsewhere.
-std::vector<double> border_distance(const Surface& surface, std::span<const std::uint8_t> side, double limit) {
+std::vector<double> border_distance(const Surface& surface, std::span<const std::uint8_t> side,
+                                    double limit) {
   std::vector<double> distance(surface.faces.size(), std::numeric_limits<double>::infinity());
   using Item = std::pair<double, std::uint32_t>;
   std::priority_queue<Item, std::vector<Item>, std::greater<>> queue;
@@ -105,7 +106,8 @@ std::vector<std::uint8_t> refine_border(const Surface& surface, std::span<const 
   double length = 0;
   for (const Link& link : surface.links)
     if (side[link.face[0]] != side[link.face[1]]) length += link.length;
-  const double radius = length / (2 * std::numbers::pi), limit = std::clamp(kBandRadii * radius, kMinBand, kMaxBand);
+  const double radius = length / (2 * std::numbers::pi),
+               limit = std::clamp(kBandRadii * radius, kMinBand, kMaxBand);
   const std::vector<double> distance = border_distance(surface, side, limit);
 
   // Nodes: the faces of the band, then the two terminals, which stand for all faces beyond the band.
@@ -128,8 +130,9 @@ std::vector<std::uint8_t> refine_border(const Surface& surface, std::span<const 
     has_source |= a == source || b == source;
     has_sink |= a == sink || b == sink;
     const double x = std::clamp(-link_bend[i] * radius, kMostConvex, kMostConcave);
-    edges.push_back(
-        {a, b, static_cast<std::int64_t>(std::llround(kCapacityUnits * link.length * std::exp(-kConcavityGain * x)))});
+    edges.push_back({a, b,
+                     static_cast<std::int64_t>(
+                         std::llround(kCapacityUnits * link.length * std::exp(-kConcavityGain * x)))});
   }
   if (!has_source || !has_sink) return side;
   const std::vector<std::uint8_t> reached = minimum_cut(face_of_node.size() + 2, edges, source, sink);

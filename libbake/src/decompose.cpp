@@ -24,8 +24,8 @@ constexpr double kShortestEdge = 0.01, kLongestEdge = 0.03;
 constexpr double kGaussianWindow = 0.03;
 
 Error bad(const char* name, double value, const char* required) {
-  return {Status::kBadOption, std::string("decompose.") + name + " = " + std::to_string(value) + ", must be " + required,
-          ""};
+  return {Status::kBadOption,
+          std::string("decompose.") + name + " = " + std::to_string(value) + ", must be " + required, ""};
 }
 
 Rows faces_of_components(const PreparedMesh& prepared) {
@@ -46,13 +46,14 @@ Segmentation segment_working_mesh(const Surface& surface, const DecomposeOptions
   Segmentation segmentation = one_segment(surface.faces.size());
   if (options.use_boundary_strength) cut_by_boundary_strength(surface, options, segmentation);
   if (options.use_hyperbolic)
-    cut_by_hyperbolic_curvature(surface, face_means(surface, curvature(surface, kGaussianWindow).gaussian), options,
-                                segmentation);
+    cut_by_hyperbolic_curvature(surface, face_means(surface, curvature(surface, kGaussianWindow).gaussian),
+                                options, segmentation);
   join_small_pieces(surface, options.min_part_area, segmentation);
   return segmentation;
 }
 
-// Segments of one component. `share` is its part of the whole mesh's area: small components are worked on coarsely.
+// Segments of one component. `share` is its part of the whole mesh's area: small components are worked on
+// coarsely.
 Segmentation segment_component(const Triangles& input, double share, const DecomposeOptions& options) {
   const Surface full = make_surface(input);
   const double unit = full.scale_m * std::pow(share, -0.25);
@@ -119,7 +120,8 @@ void for_each_surface(const PreparedMesh& prepared, const Visit& visit) {
 Outcome DecomposeOptions::check() const {
   if (source_count < 1 || source_count > 1000) return bad("source_count", source_count, "in [1, 1000]");
   if (!(window > 0 && window <= 1)) return bad("window", window, "in (0, 1]");
-  if (!(locale_width >= 0.005 && locale_width <= 0.5)) return bad("locale_width", locale_width, "in [0.005, 0.5]");
+  if (!(locale_width >= 0.005 && locale_width <= 0.5))
+    return bad("locale_width", locale_width, "in [0.005, 0.5]");
   if (!(boundary_strength >= 0 && boundary_strength <= 1))
     return bad("boundary_strength", boundary_strength, "in [0, 1]");
   if (!(min_hull_gain >= 0 && min_hull_gain <= 1)) return bad("min_hull_gain", min_hull_gain, "in [0, 1]");
@@ -134,8 +136,9 @@ Result<Decomposition> decompose(const PreparedMesh& prepared, const DecomposeOpt
   if (const Outcome outcome = options.check(); !outcome) return outcome.error();
   const Mesh& mesh = prepared.mesh;
   if (prepared.component.size() != mesh.faces.size())
-    return Error{Status::kInvalidMesh, std::to_string(prepared.component.size()) + " component numbers for " +
-                                           std::to_string(mesh.faces.size()) + " faces, need one a face",
+    return Error{Status::kInvalidMesh,
+                 std::to_string(prepared.component.size()) + " component numbers for " +
+                     std::to_string(mesh.faces.size()) + " faces, need one a face",
                  "call check_and_repair first"};
   const Rows faces_of = faces_of_components(prepared);
   const std::size_t component_count = faces_of.begin.size() - 1;
@@ -158,7 +161,8 @@ Result<Decomposition> decompose(const PreparedMesh& prepared, const DecomposeOpt
     const auto first = static_cast<std::uint32_t>(result.reasons.size());
     for (std::size_t i = 0; i < part.label.size(); ++i) result.label[faces_of[c][i]] = first + part.label[i];
     for (const CutReason reason : part.reasons)
-      result.reasons.push_back(reason == CutReason::kWhole && component_count > 1 ? CutReason::kComponent : reason);
+      result.reasons.push_back(reason == CutReason::kWhole && component_count > 1 ? CutReason::kComponent
+                                                                                  : reason);
   }
   number_by_size(mesh, result);
   progress.at("decompose", 1);

@@ -21,8 +21,9 @@ constexpr float kInfinity = std::numeric_limits<float>::infinity();
 using QueueItem = std::pair<float, std::uint32_t>;
 using MinQueue = std::priority_queue<QueueItem, std::vector<QueueItem>, std::greater<>>;
 
-// Distance at the corner c of a triangle from the distances at a and b, for a front that is straight within the
-// triangle (unfolded into its plane, the source is the point at distances da and db on the far side of ab).
+// Distance at the corner c of a triangle from the distances at a and b, for a front that is straight within
+// the triangle (unfolded into its plane, the source is the point at distances da and db on the far side of
+// ab).
 float distance_across(const Vec3d& pa, const Vec3d& pb, const Vec3d& pc, float da, float db) {
   const Vec3d ab = pb - pa, ac = pc - pa;
   const double base = norm(ab);
@@ -57,8 +58,8 @@ bool has_needles(const Surface& surface) {
   return false;
 }
 
-// Intrinsic distance is at least the straight line. Heat distances undercut it a little near the source and on coarse
-// meshes; a solution far below it, or absurdly long, is a failed solve.
+// Intrinsic distance is at least the straight line. Heat distances undercut it a little near the source and
+// on coarse meshes; a solution far below it, or absurdly long, is a failed solve.
 bool is_plausible(const Surface& surface, std::uint32_t source, const std::vector<float>& distance) {
   double sum = 0, straight_sum = 0;
   for (std::size_t v = 0; v < distance.size(); ++v) {
@@ -127,10 +128,10 @@ std::vector<float> fast_marching(const Surface& surface, std::span<const std::ui
       for (int turn = 1; turn <= 2; ++turn) {
         const std::uint32_t w = face[(corner + turn) % 3], third = face[(corner + 3 - turn) % 3];
         if (done[w]) continue;
-        const float via =
-            done[third] ? distance_across(surface.points[v], surface.points[third], surface.points[w], distance[v],
-                                          distance[third])
-                        : static_cast<float>(distance[v] + norm(surface.points[w] - surface.points[v]));
+        const float via = done[third]
+                              ? distance_across(surface.points[v], surface.points[third], surface.points[w],
+                                                distance[v], distance[third])
+                              : static_cast<float>(distance[v] + norm(surface.points[w] - surface.points[v]));
         if (!(via < distance[w])) continue;
         distance[w] = via;
         queue.emplace(via, w);
@@ -147,7 +148,8 @@ std::vector<std::vector<float>> distances_from_each(const Surface& surface,
   // One solver a block: it holds scratch. Blocks are few because each factors the matrix again.
   constexpr std::size_t kBlocks = 2;
   tbb::parallel_for(std::size_t{0}, kBlocks, [&](std::size_t block) {
-    const std::size_t begin = vertices.size() * block / kBlocks, end = vertices.size() * (block + 1) / kBlocks;
+    const std::size_t begin = vertices.size() * block / kBlocks,
+                      end = vertices.size() * (block + 1) / kBlocks;
     if (begin == end) return;
     const std::unique_ptr<HeatSolver> solver = use_heat ? make_heat_solver(surface) : nullptr;
     for (std::size_t i = begin; i < end; ++i) {
@@ -168,7 +170,8 @@ std::vector<double> vertex_protrusion(const Surface& surface, std::span<const So
   return protrusion;
 }
 
-bool is_largest_within(const Surface& surface, std::span<const double> value, std::uint32_t vertex, double window) {
+bool is_largest_within(const Surface& surface, std::span<const double> value, std::uint32_t vertex,
+                       double window) {
   std::unordered_map<std::uint32_t, float> distance{{vertex, 0.0F}};
   MinQueue queue;
   queue.emplace(0.0F, vertex);

@@ -14,7 +14,8 @@ namespace sqmap::bake {
 namespace {
 
 using CgalMesh = CGAL::Surface_mesh<CGAL::Simple_cartesian<double>::Point_3>;
-using CgalHeat = CGAL::Heat_method_3::Surface_mesh_geodesic_distances_3<CgalMesh, CGAL::Heat_method_3::Direct>;
+using CgalHeat =
+    CGAL::Heat_method_3::Surface_mesh_geodesic_distances_3<CgalMesh, CGAL::Heat_method_3::Direct>;
 
 // False when the faces are not a manifold that CGAL accepts.
 bool fill(const Surface& surface, CgalMesh& mesh) {
@@ -50,7 +51,8 @@ class CgalSolver final : public HeatSolver {
     }
     std::vector<float> result;
     result.reserve(mesh_.number_of_vertices());
-    for (const CgalMesh::Vertex_index v : mesh_.vertices()) result.push_back(static_cast<float>(distance_[v]));
+    for (const CgalMesh::Vertex_index v : mesh_.vertices())
+      result.push_back(static_cast<float>(distance_[v]));
     return result;
   }
 

@@ -10,7 +10,10 @@ namespace {
 class Network {
  public:
   Network(std::size_t node_count, std::span<const FlowEdge> edges)
-      : begin_(node_count + 1, 0), target_(2 * edges.size()), twin_(2 * edges.size()), residual_(2 * edges.size()) {
+      : begin_(node_count + 1, 0),
+        target_(2 * edges.size()),
+        twin_(2 * edges.size()),
+        residual_(2 * edges.size()) {
     for (const FlowEdge& edge : edges) {
       ++begin_[edge.a + 1];
       ++begin_[edge.b + 1];
@@ -90,8 +93,8 @@ class Network {
 
 }  // namespace
 
-std::vector<std::uint8_t> minimum_cut(std::size_t node_count, std::span<const FlowEdge> edges, std::uint32_t source,
-                                      std::uint32_t sink) {
+std::vector<std::uint8_t> minimum_cut(std::size_t node_count, std::span<const FlowEdge> edges,
+                                      std::uint32_t source, std::uint32_t sink) {
   Network network(node_count, edges);
   while (network.level(source, sink)) network.block(source, sink);
   return network.reached();

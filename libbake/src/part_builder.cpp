@@ -33,8 +33,8 @@ Result<Part> fit_part(const SolidSet& set, const Cell& cell, const FitOptions& o
   const std::vector<Vec3d> points_m = set.points(cell.solid);
   auto fit = fit_superquadric(points_m, options);
   if (!fit) return fit.error();
-  // A box wants sharper edges than the usual bound on exponents allows. On other parts that bound costs 2-3 % of volume
-  // and buys smoother maps.
+  // A box wants sharper edges than the usual bound on exponents allows. On other parts that bound costs 2-3 %
+  // of volume and buys smoother maps.
   constexpr double kWorthSharpEdges = 0.9;
   const Superquadric& shape = fit.value().shape;
   if (std::min(shape.e1, shape.e2) < 1.01 * options.min_exponent) {

@@ -62,7 +62,8 @@ void join(Segmentation& segmentation, std::uint32_t from, std::uint32_t to) {
     if (label == from) label = to;
 }
 
-// Joins every segment below `min_area` to the neighbour it shares the longest border with; false when there is none.
+// Joins every segment below `min_area` to the neighbour it shares the longest border with; false when there
+// is none.
 bool join_small(const Surface& surface, double min_area, Segmentation& segmentation) {
   const std::vector<double> area = segment_areas(surface, segmentation);
   std::map<Pair, double> length;
@@ -150,11 +151,11 @@ int apply_cut(const Surface& surface, std::span<const double> link_bend, std::sp
     if (!(smaller >= rules.min_area)) continue;
     const double strength = border_strength(measure_border(surface, link_bend, new_border[s]), smaller);
     if (!(strength >= rules.min_strength)) continue;
-    if (strength < rules.proven_strength &&
-        hull_volume(surface, piece[0]) + hull_volume(surface, piece[1]) >
-            (1 - rules.min_hull_gain) * hull_volume(surface, faces[s]))
+    if (strength < rules.proven_strength && hull_volume(surface, piece[0]) + hull_volume(surface, piece[1]) >
+                                                (1 - rules.min_hull_gain) * hull_volume(surface, faces[s]))
       continue;
-    for (const std::uint32_t f : piece[1]) segmentation.label[f] = static_cast<std::uint32_t>(segmentation.reasons.size());
+    for (const std::uint32_t f : piece[1])
+      segmentation.label[f] = static_cast<std::uint32_t>(segmentation.reasons.size());
     segmentation.reasons[s] = reason;
     segmentation.reasons.push_back(reason);
     ++count;

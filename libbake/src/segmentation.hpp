@@ -5,8 +5,9 @@
 #include <span>
 #include <vector>
 
-#include "cuts.hpp"
 #include "sqmap/asset/asset.hpp"
+
+#include "cuts.hpp"
 #include "surface.hpp"
 
 namespace sqmap::bake {
@@ -31,13 +32,13 @@ struct CutRules {
   double min_hull_gain;    ///< share of its hull's volume that the segment must lose
 };
 
-/// Splits every segment that the face set `side` crosses, where the pieces and the new border inside the segment satisfy
-/// the rules. Returns how many segments were split.
+/// Splits every segment that the face set `side` crosses, where the pieces and the new border inside the
+/// segment satisfy the rules. Returns how many segments were split.
 int apply_cut(const Surface& surface, std::span<const double> link_bend, std::span<const std::uint8_t> side,
               const CutRules& rules, CutReason reason, Segmentation& segmentation);
 
-/// Makes segments connected and at least `min_area` large: smaller pieces join the neighbour they share the longest
-/// border with. Numbers segments in order of their first face.
+/// Makes segments connected and at least `min_area` large: smaller pieces join the neighbour they share the
+/// longest border with. Numbers segments in order of their first face.
 void join_small_pieces(const Surface& surface, double min_area, Segmentation& segmentation);
 
 /// Merges neighbours whose common border is less concave than `min_concavity`, the flattest first.

@@ -139,7 +139,8 @@ Surface make_surface(const Triangles& triangles) {
   return surface;
 }
 
-Triangles extract(const std::vector<Vec3d>& points, const std::vector<std::array<std::uint32_t, 3>>& all_faces,
+Triangles extract(const std::vector<Vec3d>& points,
+                  const std::vector<std::array<std::uint32_t, 3>>& all_faces,
                   std::span<const std::uint32_t> faces) {
   Triangles part;
   part.faces.reserve(faces.size());

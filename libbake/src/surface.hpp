@@ -21,7 +21,8 @@ struct Link {
   std::array<std::uint32_t, 2> face;
   std::array<std::uint32_t, 2> vertex;  ///< the shared edge
   double length;
-  double bend_rad;  ///< angle between the normals, > 0 convex, < 0 concave; 0 where the two orientations disagree
+  double bend_rad;  ///< angle between the normals, > 0 convex, < 0 concave; 0 where the two orientations
+                    ///< disagree
 };
 
 /// Lists of varying length in one array: row i is values[begin[i] .. begin[i + 1]).
@@ -35,16 +36,17 @@ struct Rows {
 /// Groups `count` (row, value) pairs by row; within a row the order is kept.
 Rows group_rows(std::size_t row_count, std::span<const std::array<std::uint32_t, 2>> pairs);
 
-/// One connected component with its dual graph, moved to its centroid and scaled to unit area. Every length and
-/// threshold of the decomposition is then relative to the square root of the component's area.
+/// One connected component with its dual graph, moved to its centroid and scaled to unit area. Every length
+/// and threshold of the decomposition is then relative to the square root of the component's area.
 ///
-/// Faces of zero area may occur. An edge of k > 2 faces links them in a chain, so that the component stays connected.
+/// Faces of zero area may occur. An edge of k > 2 faces links them in a chain, so that the component stays
+/// connected.
 struct Surface {
   std::vector<Vec3d> points;
   std::vector<std::array<std::uint32_t, 3>> faces;
-  std::vector<double> area;      ///< sums to 1; shape [faces]
-  std::vector<Vec3d> centroid;   ///< shape [faces]
-  std::vector<Vec3d> normal;     ///< unit, or zero for a face of zero area; shape [faces]
+  std::vector<double> area;     ///< sums to 1; shape [faces]
+  std::vector<Vec3d> centroid;  ///< shape [faces]
+  std::vector<Vec3d> normal;    ///< unit, or zero for a face of zero area; shape [faces]
   std::vector<Link> links;
   Rows links_of_face;
   Rows faces_of_vertex;
@@ -59,12 +61,15 @@ struct Surface {
   }
 };
 
-/// Builds the dual graph. The triangles must be connected over edges, with positive total area. Orientation: a closed
-/// component whose signed volume is negative is turned, so that convex and concave keep their meaning.
+/// Builds the dual graph. The triangles must be connected over edges, with positive total area. Orientation:
+/// a closed component whose signed volume is negative is turned, so that convex and concave keep their
+/// meaning.
 Surface make_surface(const Triangles& triangles);
 
-/// A vertex index for the used points only, in order of first use by the faces of one component; `faces` selects.
-Triangles extract(const std::vector<Vec3d>& points, const std::vector<std::array<std::uint32_t, 3>>& all_faces,
+/// A vertex index for the used points only, in order of first use by the faces of one component; `faces`
+/// selects.
+Triangles extract(const std::vector<Vec3d>& points,
+                  const std::vector<std::array<std::uint32_t, 3>>& all_faces,
                   std::span<const std::uint32_t> faces);
 
 }  // namespace sqmap::bake

@@ -35,7 +35,8 @@ Split split_long_edges(const Triangles& input, double longest_edge, std::size_t 
     const auto middle = [&](std::uint32_t a, std::uint32_t b) -> std::int64_t {
       const Vec3d pa = points[std::min(a, b)], pb = points[std::max(a, b)];  // same order for both faces
       if (!(norm(pb - pa) > longest_edge)) return -1;
-      const auto [entry, is_new] = midpoint.try_emplace(edge_key(a, b), static_cast<std::uint32_t>(points.size()));
+      const auto [entry, is_new] =
+          midpoint.try_emplace(edge_key(a, b), static_cast<std::uint32_t>(points.size()));
       if (is_new) points.push_back(0.5 * (pa + pb));
       return entry->second;
     };
@@ -100,8 +101,7 @@ class Collapser {
 
   void run() {
     for (const Face& face : mesh_.faces)
-      for (int i = 0; i < 3; ++i)
-        push(face[i], face[(i + 1) % 3]);
+      for (int i = 0; i < 3; ++i) push(face[i], face[(i + 1) % 3]);
     while (!queue_.empty()) {
       const auto [length, low, high] = queue_.top();
       queue_.pop();
@@ -138,8 +138,8 @@ class Collapser {
     std::sort(list.begin(), list.end());
   }
 
-  // Link condition: the two vertices share exactly the neighbours that lie opposite in their two common faces, each
-  // vertex lies inside one closed fan, and no remaining face turns over.
+  // Link condition: the two vertices share exactly the neighbours that lie opposite in their two common
+  // faces, each vertex lies inside one closed fan, and no remaining face turns over.
   bool may_collapse(std::uint32_t a, std::uint32_t b) {
     neighbours(a, ring_a_);
     neighbours(b, ring_b_);
@@ -209,8 +209,8 @@ class Collapser {
 }  // namespace
 
 WorkingMesh make_working_mesh(const Triangles& input, double shortest_edge, double longest_edge) {
-  constexpr std::size_t kMaxSplitFaces = 400'000;  // a mesh of long needles would otherwise grow without bound
-  Split split = split_long_edges(input, longest_edge, kMaxSplitFaces);
+  constexpr std::size_t kMaxNewFaces = 60'000;  // a mesh of long needles would otherwise grow without bound
+  Split split = split_long_edges(input, longest_edge, input.faces.size() + kMaxNewFaces);
   const std::vector<Face> before = split.triangles.faces;
   Collapser collapser(split.triangles, shortest_edge);
   collapser.run();
@@ -233,7 +233,8 @@ WorkingMesh make_working_mesh(const Triangles& input, double shortest_edge, doub
   const std::vector<Vec3d>& points = split.triangles.points;
   const auto centroid = [&](const Face& face) {
     const auto [a, b, c] = face;
-    return (1.0 / 3.0) * (points[collapser.survivor(a)] + points[collapser.survivor(b)] + points[collapser.survivor(c)]);
+    return (1.0 / 3.0) *
+           (points[collapser.survivor(a)] + points[collapser.survivor(b)] + points[collapser.survivor(c)]);
   };
   working.faces_of_input.resize(input.faces.size());
   for (std::uint32_t f = 0; f < before.size(); ++f) {

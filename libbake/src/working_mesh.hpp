@@ -8,15 +8,16 @@
 
 namespace sqmap::bake {
 
-/// A surface of about even edge lengths in place of one component, so that the decomposition neither slows down on
-/// fine meshes nor depends on how the input was tessellated; and the way back.
+/// A surface of about even edge lengths in place of one component, so that the decomposition neither slows
+/// down on fine meshes nor depends on how the input was tessellated; and the way back.
 struct WorkingMesh {
   Triangles triangles;
   std::vector<std::vector<std::uint32_t>> faces_of_input;  ///< working faces each input face became part of
 };
 
-/// Splits edges longer than `longest_edge`, then collapses edges shorter than `shortest_edge` to their midpoints where
-/// that neither changes the topology nor flips a face. Works on any triangles; non-manifold edges are left alone.
+/// Splits edges longer than `longest_edge`, then collapses edges shorter than `shortest_edge` to their
+/// midpoints where that neither changes the topology nor flips a face. Works on any triangles; non-manifold
+/// edges are left alone.
 WorkingMesh make_working_mesh(const Triangles& input, double shortest_edge, double longest_edge);
 
 }  // namespace sqmap::bake

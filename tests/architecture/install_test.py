@@ -5,6 +5,7 @@ as a folder of that project.
 Usage: install_test.py BUILD_DIR SOURCE_DIR CXX_COMPILER [BUNDLE]    (no bundle: sqmap was built without io)
 """
 import os
+import re
 import subprocess
 import sys
 import tempfile
@@ -56,7 +57,9 @@ def names_folder(prefix, folders):
             if name.endswith(".cmake"):
                 with open(os.path.join(folder, name), encoding="utf-8") as file:
                     text = file.read()
-                yield from (f"{name} names {path}" for path in folders if path in text)
+                # Where a path begins: a folder of the package may end in the same words.
+                found = (re.search(r"(?<![\w}/.-])" + re.escape(path), text) for path in folders)
+                yield from (f"{name} names {match[0]}" for match in found if match)
 
 
 def main(build_dir, source_dir, compiler, bundle=None):

@@ -38,7 +38,7 @@ std::vector<NamedShape> analytic_shapes() {
       {"box", test::box({0.4, 0.5, 0.6}), 0.96},
       {"cylinder", test::cylinder(0.4, 0.6, 64), kPi * 0.16 * 1.2},
       {"cone", test::cone(0.5, 1.0, 64), kPi * 0.25 / 3,
-       0.2},  // a base seen edge-on by the rays of the sides, in large triangles that cannot be cut
+       0.4},  // a base seen edge-on by the rays of the sides, in large triangles that cannot be cut
       {"torus", test::torus(1, 0.3, 64, 32), 2 * kPi * kPi * 0.09},
   };
 }

@@ -26,27 +26,27 @@ inline constexpr std::uint32_t kNewFace = 0xFFFFFFFF;
 enum class UpAxis { kX, kY, kZ };
 
 struct ReadOptions {
-  double metres_per_unit = 1;   ///< length of one unit of the input [m], > 0
-  UpAxis up = UpAxis::kZ;       ///< kZ: coordinates are taken as they are
+  double metres_per_unit = 1;                             ///< length of one unit of the input [m], > 0
+  UpAxis up = UpAxis::kZ;                                 ///< kZ: coordinates are taken as they are
   std::uint64_t max_file_bytes = std::uint64_t{4} << 30;  ///< larger files are refused unread
 };
 
 /// A mesh as the file gave it, with what the bundle records of its origin.
 struct SourceMesh {
-  Mesh mesh;                        ///< triangulated; source_face numbers the polygons of the file
-  std::uint32_t source_face_count{};///< polygons in the file
-  std::string name;                 ///< file name without folders
-  std::string hash;                 ///< XXH3-128 of the file's bytes, 32 hex digits
+  Mesh mesh;                          ///< triangulated; source_face numbers the polygons of the file
+  std::uint32_t source_face_count{};  ///< polygons in the file
+  std::string name;                   ///< file name without folders
+  std::string hash;                   ///< XXH3-128 of the file's bytes, 32 hex digits
   double metres_per_unit{1};
   UpAxis up{UpAxis::kZ};
 };
 
-/// Reads the triangles of a mesh file: OFF and PLY in double and with the polygons numbered as in the file; OBJ, STL,
-/// glTF/GLB, DAE, FBX and 3MF through assimp, which keeps coordinates in float. Node transforms of a scene are
-/// applied; all its meshes are joined, and their polygons numbered mesh by mesh; lines and points are skipped. Files
-/// a scene refers to are opened only in its folder and below.
-/// Errors: kFileMissing, kFileUnreadable (a directory, a pipe, no permission), kUnknownFormat, kInvalidMesh
-/// (damaged, no faces, a coordinate that is NaN, infinite or beyond 1e15 m).
+/// Reads the triangles of a mesh file: OFF and PLY in double and with the polygons numbered as in the file;
+/// OBJ, STL, glTF/GLB, DAE, FBX and 3MF through assimp, which keeps coordinates in float. Node transforms of
+/// a scene are applied; all its meshes are joined, and their polygons numbered mesh by mesh; lines and points
+/// are skipped. Files a scene refers to are opened only in its folder and below. Errors: kFileMissing,
+/// kFileUnreadable (a directory, a pipe, no permission), kUnknownFormat, kInvalidMesh (damaged, no faces, a
+/// coordinate that is NaN, infinite or beyond 1e15 m).
 Result<SourceMesh> read_mesh(const std::filesystem::path& path, const ReadOptions& options = {});
 
 /// What check_and_repair may change.
@@ -58,8 +58,8 @@ enum class Repair {
 
 struct RepairOptions {
   Repair policy = Repair::kAll;
-  double weld_tolerance = 1e-9;       ///< vertices closer than this share of the diagonal become one
-  std::uint32_t max_hole_edges = 128; ///< longer boundary loops stay open
+  double weld_tolerance = 1e-9;        ///< vertices closer than this share of the diagonal become one
+  std::uint32_t max_hole_edges = 128;  ///< longer boundary loops stay open
 };
 
 /// A mesh ready to bake, with the record of what was found and done.
@@ -69,8 +69,8 @@ struct PreparedMesh {
   std::vector<std::uint32_t> component;  ///< connected component of each face; shape [faces]
 };
 
-/// Checks and repairs. Deterministic. Errors: kInvalidMesh when no face with area is left, or the mesh spans a
-/// volume of zero thickness that no superquadric can bound.
+/// Checks and repairs. Deterministic. Errors: kInvalidMesh when no face with area is left, or the mesh spans
+/// a volume of zero thickness that no superquadric can bound.
 Result<PreparedMesh> check_and_repair(const SourceMesh& source, const RepairOptions& options = {});
 
 }  // namespace sqmap::bake
