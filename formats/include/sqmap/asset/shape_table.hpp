@@ -107,8 +107,8 @@ template <class T>
 ShapeTable<T>::ShapeTable(const Superquadric& shape, std::uint32_t rows, std::uint32_t cols)
     : axes_m_(cast<T>(shape.semi_axes_m)),
       inverse_axes_{T(1 / shape.semi_axes_m.x), T(1 / shape.semi_axes_m.y), T(1 / shape.semi_axes_m.z)},
-      half_rows_(T((rows - 1) / 2)),
-      quarter_cols_(T(cols / 4)) {
+      half_rows_(T(rows - 1) / T(2)),
+      quarter_cols_(T(cols) / T(4)) {
   const std::uint32_t half = (rows - 1) / 2, quarter = cols / 4;
   const std::uint32_t eta_factor = (kMinCells + half - 1) / half;
   const std::uint32_t omega_factor = (kMinCells + quarter - 1) / quarter;
