@@ -34,25 +34,45 @@ Outcome BakeOptions::check() const {
   return fit.check();
 }
 
+// Each structure is taken apart by name, so that a new option that is not written here does not compile.
 std::string BakeOptions::to_json() const {
   static constexpr const char* kRepairNames[] = {"none", "safe", "all"};
   static constexpr const char* kAxisNames[] = {"x", "y", "z"};
+  const auto& [read_options, repair_options, decompose_options, fit_options, error_percent, parts, bytes,
+               samples, sample_seed] = *this;
+  const auto& [metres_per_unit, up, size_limit] = read_options;  // the limit decides no byte
+  const auto& [policy, weld_tolerance, max_hole_edges] = repair_options;
+  const auto& [source_count, window, locale_width, boundary_strength, min_hull_gain, k_h, t_h,
+               use_boundary_strength, use_hyperbolic, min_part_area] = decompose_options;
+  const auto& [min_exponent, max_exponent, max_iterations, min_axis_ratio, quick] = fit_options;
   const nlohmann::json json = {
-      {"max_error_percent", max_error_percent},
-      {"max_parts", max_parts},
-      {"max_bytes", max_bytes},
-      {"sample_count", sample_count},
-      {"seed", seed},
-      {"read", {{"metres_per_unit", read.metres_per_unit}, {"up", kAxisNames[static_cast<int>(read.up)]}}},
+      {"max_error_percent", error_percent},
+      {"max_parts", parts},
+      {"max_bytes", bytes},
+      {"sample_count", samples},
+      {"seed", sample_seed},
+      {"read", {{"metres_per_unit", metres_per_unit}, {"up", kAxisNames[static_cast<int>(up)]}}},
       {"repair",
-       {{"policy", kRepairNames[static_cast<int>(repair.policy)]},
-        {"weld_tolerance", repair.weld_tolerance},
-        {"max_hole_edges", repair.max_hole_edges}}},
+       {{"policy", kRepairNames[static_cast<int>(policy)]},
+        {"weld_tolerance", weld_tolerance},
+        {"max_hole_edges", max_hole_edges}}},
+      {"decompose",
+       {{"source_count", source_count},
+        {"window", window},
+        {"locale_width", locale_width},
+        {"boundary_strength", boundary_strength},
+        {"min_hull_gain", min_hull_gain},
+        {"k_h", k_h},
+        {"t_h", t_h},
+        {"use_boundary_strength", use_boundary_strength},
+        {"use_hyperbolic", use_hyperbolic},
+        {"min_part_area", min_part_area}}},
       {"fit",
-       {{"min_exponent", fit.min_exponent},
-        {"max_exponent", fit.max_exponent},
-        {"max_iterations", fit.max_iterations},
-        {"min_axis_ratio", fit.min_axis_ratio}}},
+       {{"min_exponent", min_exponent},
+        {"max_exponent", max_exponent},
+        {"max_iterations", max_iterations},
+        {"min_axis_ratio", min_axis_ratio},
+        {"quick", quick}}},
   };
   return json.dump();
 }

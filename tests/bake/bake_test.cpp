@@ -151,6 +151,23 @@ TEST(Bake, StopsWhenAsked) {
   EXPECT_EQ(result.error().status, Status::kCancelled);
 }
 
+TEST(Bake, WritesDownEveryOptionThatDecidesTheBytes) {
+  const std::string usual = BakeOptions().to_json();
+  const auto changes = [&](auto&& change) {
+    BakeOptions options;
+    change(options);
+    return options.to_json() != usual;
+  };
+  EXPECT_TRUE(changes([](BakeOptions& o) { o.decompose.min_hull_gain = 0.06; }));
+  EXPECT_TRUE(changes([](BakeOptions& o) { o.decompose.use_hyperbolic = false; }));
+  EXPECT_TRUE(changes([](BakeOptions& o) { o.decompose.locale_width = 0.02; }));
+  EXPECT_TRUE(changes([](BakeOptions& o) { o.fit.quick = true; }));
+  EXPECT_TRUE(changes([](BakeOptions& o) { o.read.up = UpAxis::kY; }));
+  EXPECT_TRUE(changes([](BakeOptions& o) { o.repair.max_hole_edges = 7; }));
+  EXPECT_TRUE(changes([](BakeOptions& o) { o.seed = 2; }));
+  EXPECT_FALSE(changes([](BakeOptions& o) { o.read.max_file_bytes = 1; }));
+}
+
 TEST(Bake, NamesTheOptionItRefuses) {
   BakeOptions options;
   options.max_error_percent = -1;

@@ -29,7 +29,7 @@ struct BakeOptions {
   std::string to_json() const;
 };
 
-/// CPU time of one stage.
+/// Wall time of one stage.
 struct StageTime {
   std::string stage;
   double seconds;
