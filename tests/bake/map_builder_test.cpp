@@ -152,14 +152,14 @@ TEST(Solid, SplitsAreClosedAndTheirVolumesAdd) {
   const double volume = set.volume_m3(whole);
   EXPECT_NEAR(volume, 2 * 9.8696 * 0.09, 0.03);
   const auto& vertices = set.vertices_m;
-  auto [left, right] =
-      set.split(whole, [&](std::size_t k) { return vertices[whole.triangles[k][0]].x < 0.1; });
+  auto [left, right] = set.split(
+      whole, [&, &solid = whole](std::size_t k) { return vertices[solid.triangles[k][0]].x < 0.1; });
   EXPECT_NEAR(set.volume_m3(left) + set.volume_m3(right), volume, 1e-12);
   EXPECT_GT(set.volume_m3(left), 0.3 * volume);
   EXPECT_GT(set.volume_m3(right), 0.3 * volume);
   // Cut again, across the first cut's caps: still closed, so the volume does not depend on the origin.
   auto [upper, lower] =
-      set.split(left, [&](std::size_t k) { return set.vertices_m[left.triangles[k][0]].z > 0.05; });
+      set.split(left, [&, &solid = left](std::size_t k) { return vertices[solid.triangles[k][0]].z > 0.05; });
   const double sum = set.volume_m3(upper) + set.volume_m3(lower);
   EXPECT_NEAR(sum, set.volume_m3(left), 1e-12);
   SolidSet moved = set;
@@ -172,8 +172,9 @@ TEST(Solid, InnerPointsLieInTheHullOfSomePart) {
   const Scene scene(test::torus(1, 0.3, 48, 24));
   auto [set, whole] = SolidSet::whole(scene.mesh);
   const auto& v = set.vertices_m;
-  auto [a, rest] = set.split(whole, [&](std::size_t k) { return v[whole.triangles[k][0]].x < -0.2; });
-  auto [b, c] = set.split(rest, [&](std::size_t k) { return set.vertices_m[rest.triangles[k][0]].y < 0; });
+  auto [a, rest] =
+      set.split(whole, [&, &solid = whole](std::size_t k) { return v[solid.triangles[k][0]].x < -0.2; });
+  auto [b, c] = set.split(rest, [&, &solid = rest](std::size_t k) { return v[solid.triangles[k][0]].y < 0; });
   std::vector<Oracle> parts;
   for (const Solid* solid : {&a, &b, &c}) {
     Mesh mesh;
