@@ -12,6 +12,7 @@
 #include "sqmap/runtime/object.hpp"
 
 #include "hull.hpp"
+#include "long_edges.hpp"
 #include "map_builder.hpp"
 #include "measure.hpp"
 #include "part_builder.hpp"
@@ -28,6 +29,10 @@ constexpr std::uint32_t kMostQuadrantCells = 128;
 constexpr double kLoosening = 1.3;
 // Vertex samples are kept where the surface misses the vertex by this multiple of the error target.
 constexpr double kVertexTolerance = 2;
+// Parts take whole triangles. So that long ones do not tie together what should be cut, edges are halved down
+// to this share of R_max first, as far as the number of added triangles allows.
+constexpr double kLongestEdge = 1.0 / 16;
+constexpr std::size_t kMostAddedFaces = 20000;
 
 /// Names the stages and keeps their wall times.
 class Stages {
@@ -119,14 +124,77 @@ bool map_parts(std::vector<Part>& parts, const MeshQueries& queries, double targ
   }
 }
 
-std::vector<std::uint16_t> label_faces(const std::vector<Piece>& pieces, const Mesh& mesh,
-                                       std::uint32_t source_faces) {
-  std::vector<std::uint16_t> labels(source_faces, kNoPart);
+/// The mesh with long edges halved: what parts are made of. source_face numbers the faces of `mesh`.
+Mesh fine_mesh(const Mesh& mesh, double longest_edge_m) {
+  FineTriangles fine =
+      split_long_edges({mesh.vertices_m, mesh.faces}, longest_edge_m, mesh.faces.size() + kMostAddedFaces);
+  return {std::move(fine.triangles.points), std::move(fine.triangles.faces), std::move(fine.source_face)};
+}
+
+Decomposition on_fine_faces(Decomposition segments, const Mesh& fine) {
+  std::vector<std::uint32_t> label(fine.faces.size());
+  for (std::size_t f = 0; f < label.size(); ++f) label[f] = segments.label[fine.source_face[f]];
+  segments.label = std::move(label);
+  return segments;
+}
+
+/// Part of each face of the mesh: the one that holds most of its area.
+std::vector<std::uint16_t> owners(const std::vector<Piece>& pieces, const Mesh& fine,
+                                  std::size_t face_count) {
+  struct Share {
+    std::uint32_t face;
+    std::uint16_t part;
+    double area_m2;
+  };
+  std::vector<Share> shares;
   for (std::size_t k = 0; k < pieces.size(); ++k) {
-    for (const std::uint32_t face : pieces[k].cell.solid.face) {
-      if (face == kNewFace || mesh.source_face[face] >= source_faces) continue;
-      labels[mesh.source_face[face]] = static_cast<std::uint16_t>(k);
+    for (const std::uint32_t f : pieces[k].cell.solid.face) {
+      if (f == kNewFace) continue;
+      const auto& t = fine.faces[f];
+      const Vec3d& a = fine.vertices_m[t[0]];
+      const double area_m2 = norm(cross(fine.vertices_m[t[1]] - a, fine.vertices_m[t[2]] - a));
+      shares.push_back({fine.source_face[f], static_cast<std::uint16_t>(k), area_m2});
     }
+  }
+  std::stable_sort(shares.begin(), shares.end(), [](const Share& a, const Share& b) {
+    return std::tie(a.face, a.part) < std::tie(b.face, b.part);
+  });
+  std::vector<std::uint16_t> owner(face_count, kNoPart);
+  std::vector<double> most(face_count, -1);
+  for (std::size_t i = 0; i < shares.size();) {
+    const Share& first = shares[i];
+    double area_m2 = 0;
+    for (; i < shares.size() && shares[i].face == first.face && shares[i].part == first.part; ++i)
+      area_m2 += shares[i].area_m2;
+    if (area_m2 > most[first.face]) {
+      most[first.face] = area_m2;
+      owner[first.face] = first.part;
+    }
+  }
+  return owner;
+}
+
+/// Faces and vertices of the mesh that each part owns.
+void count_members(std::vector<Part>& parts, const Mesh& mesh, const std::vector<std::uint16_t>& owner) {
+  std::vector<std::vector<std::uint32_t>> vertices(parts.size());
+  for (std::size_t f = 0; f < owner.size(); ++f) {
+    if (owner[f] == kNoPart) continue;
+    ++parts[owner[f]].face_count;
+    vertices[owner[f]].insert(vertices[owner[f]].end(), mesh.faces[f].begin(), mesh.faces[f].end());
+  }
+  for (std::size_t k = 0; k < parts.size(); ++k) {
+    std::sort(vertices[k].begin(), vertices[k].end());
+    parts[k].vertex_count =
+        static_cast<std::uint32_t>(std::unique(vertices[k].begin(), vertices[k].end()) - vertices[k].begin());
+  }
+}
+
+/// Part of each face of the input; kNoPart for those that repair dropped.
+std::vector<std::uint16_t> label_input_faces(const std::vector<std::uint16_t>& owner, const Mesh& mesh,
+                                             std::uint32_t input_faces) {
+  std::vector<std::uint16_t> labels(input_faces, kNoPart);
+  for (std::size_t f = 0; f < owner.size(); ++f) {
+    if (mesh.source_face[f] < input_faces) labels[mesh.source_face[f]] = owner[f];
   }
   return labels;
 }
@@ -164,11 +232,13 @@ Result<BakeResult> bake(const SourceMesh& source, const BakeOptions& options, co
   stages.begin("decompose");
   auto segments = decompose(prepared, options.decompose, progress);
   if (!segments) return segments.error();
-  auto [set, whole] = SolidSet::whole(prepared.mesh);
 
   stages.begin("refine");
-  auto refined =
-      refine(set, close_segments(set, whole, segments.value()), queries, r_max_m, options, progress);
+  const Mesh fine = fine_mesh(prepared.mesh, kLongestEdge * r_max_m);
+  const Decomposition fine_segments = on_fine_faces(std::move(segments).value(), fine);
+  auto [set, whole] = SolidSet::whole(fine);
+  auto refined = refine(set, close_segments(set, whole, fine_segments),
+                        {fine, rays, oracle, queries.is_closed}, r_max_m, options, progress);
   if (!refined) return refined.error();
   std::vector<Piece>& pieces = refined.value().pieces;
   sort_pieces(pieces);
@@ -180,10 +250,12 @@ Result<BakeResult> bake(const SourceMesh& source, const BakeOptions& options, co
   asset.r_max_m = r_max_m;
   for (const Piece& piece : pieces) asset.parts.push_back(piece.part);
   asset.sphere = enclosing_sphere(asset.parts);
+  const std::vector<std::uint16_t> owner = owners(pieces, fine, prepared.mesh.faces.size());
+  count_members(asset.parts, prepared.mesh, owner);
+  asset.face_labels = label_input_faces(owner, prepared.mesh, source.source_face_count);
   if (map_parts(asset.parts, queries, options.max_error_percent / 100 * r_max_m, options.max_bytes)) {
     result.stopped_by = "bytes";
   }
-  asset.face_labels = label_faces(pieces, prepared.mesh, source.source_face_count);
   asset.mesh = prepared.record;
   asset.provenance = provenance(source, options);
   if (progress.stop()) return cancelled();

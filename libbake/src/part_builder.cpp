@@ -49,14 +49,6 @@ Result<Part> fit_part(const SolidSet& set, const Cell& cell, const FitOptions& o
   part.sphere = {part.object_from_part.translation_m, bounding_radius_m(part.shape)};
   part.segment = cell.segment;
   part.reason = cell.reason;
-  std::vector<std::uint32_t> ids;
-  for (std::size_t k = 0; k < cell.solid.triangles.size(); ++k) {
-    if (cell.solid.face[k] == kNewFace) continue;
-    ++part.face_count;
-    ids.insert(ids.end(), cell.solid.triangles[k].begin(), cell.solid.triangles[k].end());
-  }
-  std::sort(ids.begin(), ids.end());
-  part.vertex_count = static_cast<std::uint32_t>(std::unique(ids.begin(), ids.end()) - ids.begin());
   part.volume_m3 = set.volume_m3(cell.solid);
   return part;
 }
