@@ -152,25 +152,23 @@ std::vector<Cell> close_segments(SolidSet& set, const Solid& whole, const Decomp
   return cells;
 }
 
-std::optional<std::vector<bool>> best_plane_cut(const SolidSet& set, const Solid& solid) {
+std::vector<std::vector<bool>> plane_cuts_by_merit(const SolidSet& set, const Solid& solid) {
   std::vector<Cut> cuts = plane_cuts(set, solid, kQuantiles);
   // The best of each axis is judged by what one more cut of both sides leaves. Halving a ring across gains
   // nothing at once and much at the next cut; slicing it flat gains nothing at either.
-  const Cut* best = nullptr;
-  double least_m3 = std::numeric_limits<double>::infinity();
+  std::vector<Cut> best_of_axis;
   for (std::size_t begin = 0; begin < cuts.size(); begin += kQuantiles.size()) {
     const auto first = cuts.begin() + static_cast<std::ptrdiff_t>(begin);
-    const Cut& cut = *std::min_element(first, first + kQuantiles.size(), encloses_less);
+    Cut& cut = *std::min_element(first, first + kQuantiles.size(), encloses_less);
     if (cut.first_side.empty()) continue;
-    const double volume_m3 = volume_after_next_cut_m3(set, side_of(solid, cut, true)) +
-                             volume_after_next_cut_m3(set, side_of(solid, cut, false));
-    if (best == nullptr || volume_m3 < least_m3) {
-      best = &cut;
-      least_m3 = volume_m3;
-    }
+    cut.volume_m3 = volume_after_next_cut_m3(set, side_of(solid, cut, true)) +
+                    volume_after_next_cut_m3(set, side_of(solid, cut, false));
+    best_of_axis.push_back(std::move(cut));
   }
-  if (best == nullptr) return std::nullopt;
-  return best->first_side;
+  std::stable_sort(best_of_axis.begin(), best_of_axis.end(), encloses_less);
+  std::vector<std::vector<bool>> sides;
+  for (Cut& cut : best_of_axis) sides.push_back(std::move(cut.first_side));
+  return sides;
 }
 
 }  // namespace sqmap::bake

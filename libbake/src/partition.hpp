@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include <optional>
 #include <vector>
 
 #include "sqmap/asset/asset.hpp"
@@ -21,9 +20,9 @@ struct Cell {
 /// The segments as closed solids, in the decomposition's order.
 std::vector<Cell> close_segments(SolidSet& set, const Solid& whole, const Decomposition& segments);
 
-/// The best plane to cut a cell in two: of planes across its principal axes, the one after which the convex
-/// hulls of both sides enclose least volume. Whole triangles go to the side of their centroid. Entry k:
-/// triangle k goes to the first side. Empty when no plane leaves triangles of the mesh on both sides.
-std::optional<std::vector<bool>> best_plane_cut(const SolidSet& set, const Solid& solid);
+/// The planes to cut a cell in two by, best first: of planes across each of its principal axes, the one after
+/// which the convex hulls enclose least volume. Whole triangles go to the side of their centroid. Entry k of
+/// a cut: triangle k goes to the first side. Empty when no plane leaves triangles of the mesh on both sides.
+std::vector<std::vector<bool>> plane_cuts_by_merit(const SolidSet& set, const Solid& solid);
 
 }  // namespace sqmap::bake

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -15,15 +16,19 @@ namespace sqmap::bake {
 struct Piece {
   Cell cell;
   Part part;
+  std::optional<std::vector<std::vector<bool>>> cuts;  ///< planes to split it by, best first
+  std::size_t cuts_tried{};                            ///< of them, those that did not pay
 };
 
 struct Refinement {
   std::vector<Piece> pieces;
-  std::string stopped_by;  ///< "target" or "parts"
+  std::string stopped_by;  ///< "target", "parts" or "gain": no split lowers the error further
 };
 
-/// Splits the part that adds most to the signed-distance error near the surface, again and again, until the
-/// mean error is within the target or the parts are spent. Errors: kCancelled, kBakeFailed.
+/// Splits the parts that add most to the signed-distance error near the surface, again and again, until the
+/// mean error is within the target, the parts are spent, or no split pays. A split that does not lower the
+/// error is undone: it would cost bytes, and its seam is one more place where rays see little. Errors:
+/// kCancelled, kBakeFailed.
 Result<Refinement> refine(SolidSet& set, std::vector<Cell> cells, const MeshQueries& queries, double r_max_m,
                           const BakeOptions& options, const Progress& progress);
 

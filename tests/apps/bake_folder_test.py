@@ -45,7 +45,7 @@ class Folder(FolderTest):
         ball, _, broken, summary = records
         self.assertEqual(ball["input"], str(self.models / "ball.off"))
         self.assertEqual(ball["bytes"], (self.out / "ball.h5").stat().st_size)
-        self.assertIn(ball["stopped_by"], ("target", "parts", "bytes"))
+        self.assertIn(ball["stopped_by"], ("target", "parts", "bytes", "gain"))
         self.assertAlmostEqual(ball["r_max_m"], 2, places=5)
         self.assertGreater(len(ball["stages"]), 2)
         self.assertEqual((broken["error"]["id"], broken["error"]["exit_code"]), ("invalid-mesh", 4))

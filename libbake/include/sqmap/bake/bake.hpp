@@ -38,7 +38,8 @@ struct StageTime {
 struct BakeResult {
   Asset asset;
   std::vector<StageTime> times;  ///< not stored in the bundle
-  std::string stopped_by;        ///< "target", "parts" or "bytes": what ended the refinement
+  /// What ended the refinement: "target", "parts", "bytes", or "gain": no further split lowered the error.
+  std::string stopped_by;
 };
 
 /// The whole line: check, repair, decompose, fit, map, measure.
