@@ -19,7 +19,7 @@ namespace {
 constexpr unsigned kDeflateLevel = 9;
 constexpr unsigned kManyEntries =
     256;  // more links and attributes than any group has: HDF5 then keeps them compact
-constexpr std::size_t kGrowBytes = 64 * 1024;
+constexpr std::size_t kGrowBytes = std::size_t{64} * 1024;
 constexpr std::size_t kEofAt = kEnvelopeBytes + 28;  // end-of-file address in superblock versions 2 and 3
 
 // The file grows inside our own vector. H5Fget_file_image would be simpler, but in HDF5 1.10 it changes a

@@ -46,7 +46,7 @@ class Reach {
   Reach(const Superquadric& shape, const MapGrid& grid)
       : half_((grid.rows() - 1) / 2), quarter_(grid.cols() / 4) {
     const ShapeTable<double> table(shape, grid.rows(), grid.cols());
-    distance_m_.resize((kReachCells + 1) * (kReachCells + 1));
+    distance_m_.resize(std::size_t{kReachCells + 1} * (kReachCells + 1));
     tbb::parallel_for(0U, kReachCells + 1, [&](std::uint32_t a) {
       for (std::uint32_t b = 0; b <= kReachCells; ++b) {
         const SurfaceSample<double> s = table.sample(half_ + a * double(half_) / kReachCells,
@@ -276,7 +276,7 @@ void add_vertex_samples(Part& part, const MeshQueries& queries, double tolerance
     double miss_m{};
     DistanceMap::VertexSample sample;
   };
-  std::vector<Best> best((map.rows - 1) * map.cols);
+  std::vector<Best> best(std::size_t{map.rows - 1} * map.cols);
   std::vector<RayTracer::Hit> hits;
   for (const Vec3d& vertex_m : queries.mesh.vertices_m) {
     const Vec3d from_centre = vertex_m - part.sphere.centre_m;

@@ -247,7 +247,8 @@ TEST(RayTracer, CornersAndEdgesCountOnce) {
   const Mesh sphere = test::sphere(1, 2);
   std::vector<RayTracer::Hit> hits;
   for (int i = 1; i < 27; ++i) {
-    const Vec3d aim{double(i % 3 - 1), double(i / 3 % 3 - 1), double(i / 9 - 1)};
+    const int row = i / 3 % 3, layer = i / 9;
+    const Vec3d aim{double(i % 3 - 1), double(row - 1), double(layer - 1)};
     if (norm(aim) == 0) continue;
     box.trace(3.0 * aim, -normalized(aim), hits);
     expect_alternating(hits, 2);

@@ -115,7 +115,7 @@ TEST(Hostile, ResealedBitFlipsAreErrorsOrChangeNothing) {
   int refused = 0;
   for (int i = 0; i < 1000; ++i) {
     Bytes damaged = bytes;
-    const std::size_t bit = 8 * 512 + random() % (8 * (bytes.size() - 512));
+    const std::size_t bit = std::size_t{8} * 512 + random() % (8 * (bytes.size() - 512));
     damaged[bit / 8] ^= static_cast<std::uint8_t>(1U << (bit % 8));
     test::reseal(damaged);
     const auto decoded = io::decode(damaged);
