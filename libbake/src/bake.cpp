@@ -13,6 +13,7 @@
 
 #include "hull.hpp"
 #include "long_edges.hpp"
+#include "map_budget.hpp"
 #include "map_builder.hpp"
 #include "measure.hpp"
 #include "part_builder.hpp"
@@ -23,10 +24,6 @@ namespace sqmap::bake {
 
 namespace {
 
-// Finest map tried: 257 x 512 nodes.
-constexpr std::uint32_t kMostQuadrantCells = 128;
-// Each round that exceeds the byte budget loosens the target of the maps by this factor.
-constexpr double kLoosening = 1.3;
 // Vertex samples are kept where the surface misses the vertex by this multiple of the error target.
 constexpr double kVertexTolerance = 2;
 // Parts take whole triangles. So that long ones do not tie together what should be cut, edges are halved down
@@ -97,33 +94,6 @@ void sort_pieces(std::vector<Piece>& pieces) {
   });
 }
 
-/// What a map takes in the file, about: texels without a crossing deflate to almost nothing, the others to
-/// some three quarters of their bits.
-std::uint64_t stored_bytes(const DistanceMap& map) {
-  const auto hits = static_cast<std::uint64_t>(std::count_if(
-      map.code.begin(), map.code.end(), [&](std::uint16_t code) { return code != map.miss_code(); }));
-  constexpr std::uint64_t kSideListEntry = 5;
-  return hits * map.bits * 3 / 32 + (map.crossings.size() + map.vertex_samples.size()) * kSideListEntry;
-}
-
-/// Draws the maps of all parts within the byte budget. True: the budget, not the target, decided.
-bool map_parts(std::vector<Part>& parts, const MeshQueries& queries, double target_m,
-               std::uint64_t max_bytes) {
-  for (double loosened_m = target_m;; loosened_m *= kLoosening) {
-    tbb::parallel_for(std::size_t{0}, parts.size(), [&](std::size_t k) {
-      map_part(parts[k], queries, {loosened_m, kMostQuadrantCells});
-      add_vertex_samples(parts[k], queries, kVertexTolerance * loosened_m);
-    });
-    std::uint64_t bytes = 0;
-    bool coarsest = true;
-    for (const Part& part : parts) {
-      bytes += stored_bytes(part.map);
-      coarsest = coarsest && part.map.rows <= 9 && part.map.bits <= 4;
-    }
-    if (bytes <= max_bytes || coarsest || loosened_m > 1e3 * target_m) return loosened_m > target_m;
-  }
-}
-
 /// The mesh with long edges halved: what parts are made of. source_face numbers the faces of `mesh`.
 Mesh fine_mesh(const Mesh& mesh, double longest_edge_m) {
   FineTriangles fine =
@@ -138,6 +108,12 @@ Decomposition on_fine_faces(Decomposition segments, const Mesh& fine) {
   return segments;
 }
 
+double area_m2(const Mesh& mesh, std::uint32_t face) {
+  const auto& t = mesh.faces[face];
+  const Vec3d& a = mesh.vertices_m[t[0]];
+  return 0.5 * norm(cross(mesh.vertices_m[t[1]] - a, mesh.vertices_m[t[2]] - a));
+}
+
 /// Part of each face of the mesh: the one that holds most of its area.
 std::vector<std::uint16_t> owners(const std::vector<Piece>& pieces, const Mesh& fine,
                                   std::size_t face_count) {
@@ -150,10 +126,7 @@ std::vector<std::uint16_t> owners(const std::vector<Piece>& pieces, const Mesh& 
   for (std::size_t k = 0; k < pieces.size(); ++k) {
     for (const std::uint32_t f : pieces[k].cell.solid.face) {
       if (f == kNewFace) continue;
-      const auto& t = fine.faces[f];
-      const Vec3d& a = fine.vertices_m[t[0]];
-      const double area_m2 = norm(cross(fine.vertices_m[t[1]] - a, fine.vertices_m[t[2]] - a));
-      shares.push_back({fine.source_face[f], static_cast<std::uint16_t>(k), area_m2});
+      shares.push_back({fine.source_face[f], static_cast<std::uint16_t>(k), area_m2(fine, f)});
     }
   }
   std::stable_sort(shares.begin(), shares.end(), [](const Share& a, const Share& b) {
@@ -163,15 +136,28 @@ std::vector<std::uint16_t> owners(const std::vector<Piece>& pieces, const Mesh& 
   std::vector<double> most(face_count, -1);
   for (std::size_t i = 0; i < shares.size();) {
     const Share& first = shares[i];
-    double area_m2 = 0;
+    double sum_m2 = 0;
     for (; i < shares.size() && shares[i].face == first.face && shares[i].part == first.part; ++i)
-      area_m2 += shares[i].area_m2;
-    if (area_m2 > most[first.face]) {
-      most[first.face] = area_m2;
+      sum_m2 += shares[i].area_m2;
+    if (sum_m2 > most[first.face]) {
+      most[first.face] = sum_m2;
       owner[first.face] = first.part;
     }
   }
   return owner;
+}
+
+/// Surface of the mesh that each piece holds [m^2].
+std::vector<double> surface_areas(const std::vector<Piece>& pieces, const Mesh& fine) {
+  std::vector<double> areas_m2;
+  for (const Piece& piece : pieces) {
+    double sum_m2 = 0;
+    for (const std::uint32_t f : piece.cell.solid.face) {
+      if (f != kNewFace) sum_m2 += area_m2(fine, f);
+    }
+    areas_m2.push_back(sum_m2);
+  }
+  return areas_m2;
 }
 
 /// Faces and vertices of the mesh that each part owns.
@@ -253,9 +239,13 @@ Result<BakeResult> bake(const SourceMesh& source, const BakeOptions& options, co
   const std::vector<std::uint16_t> owner = owners(pieces, fine, prepared.mesh.faces.size());
   count_members(asset.parts, prepared.mesh, owner);
   asset.face_labels = label_input_faces(owner, prepared.mesh, source.source_face_count);
-  if (map_parts(asset.parts, queries, options.max_error_percent / 100 * r_max_m, options.max_bytes)) {
+  const double target_m = options.max_error_percent / 100 * r_max_m;
+  if (map_parts(asset.parts, surface_areas(pieces, fine), queries, {target_m, options.max_bytes})) {
     result.stopped_by = "bytes";
   }
+  tbb::parallel_for(std::size_t{0}, asset.parts.size(), [&](std::size_t k) {
+    add_vertex_samples(asset.parts[k], queries, kVertexTolerance * target_m);
+  });
   asset.mesh = prepared.record;
   asset.provenance = provenance(source, options);
   if (progress.stop()) return cancelled();

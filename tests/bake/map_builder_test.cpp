@@ -7,6 +7,7 @@
 
 #include "sqmap/runtime/object.hpp"
 
+#include "map_budget.hpp"
 #include "part_builder.hpp"
 #include "solid.hpp"
 #include "support/shapes.hpp"
@@ -106,14 +107,31 @@ TEST(Quantise, CoincidingCrossingsKeepTheParity) {
   EXPECT_EQ(later, 1);
 }
 
-TEST(MapPart, SpendsTexelsOnlyWhereTheTargetAsksForThem) {
+constexpr std::uint64_t kNoLimit = std::uint64_t{1} << 40;
+
+TEST(MapParts, SpendTexelsOnlyWhereTheTargetAsksForThem) {
   const Scene scene(test::box({0.4, 0.5, 0.6}));
-  Part part = part_around({{0.9, 1.0, 1.1}, 0.7, 0.7});
-  map_part(part, scene.queries(), {1e-2, 128});
-  const auto coarse = part.map.code.size();
-  map_part(part, scene.queries(), {1e-3, 128});
-  EXPECT_GT(part.map.code.size(), 2 * coarse);
-  EXPECT_GE(part.map.bits, 8U);
+  std::vector<Part> parts{part_around({{0.9, 1.0, 1.1}, 0.7, 0.7})};
+  EXPECT_FALSE(map_parts(parts, {1.0}, scene.queries(), {1e-2, kNoLimit}));
+  const auto coarse = parts[0].map.code.size();
+  EXPECT_FALSE(map_parts(parts, {1.0}, scene.queries(), {1e-3, kNoLimit}));
+  EXPECT_GT(parts[0].map.code.size(), 2 * coarse);
+  EXPECT_GE(parts[0].map.bits, 8U);
+}
+
+TEST(MapParts, GiveTexelsToThePartWithTheLargerShareOfTheSurface) {
+  const Scene scene(test::box({0.4, 0.5, 0.6}));
+  const Part part = part_around({{0.9, 1.0, 1.1}, 0.7, 0.7});
+  std::vector<Part> parts{part, part};
+  map_parts(parts, {1.0, 20.0}, scene.queries(), {2e-3, kNoLimit});
+  EXPECT_GT(parts[1].map.code.size(), 2 * parts[0].map.code.size());
+}
+
+TEST(MapParts, KeepToTheByteBudgetAndSaySo) {
+  const Scene scene(test::box({0.4, 0.5, 0.6}));
+  std::vector<Part> parts{part_around({{0.9, 1.0, 1.1}, 0.7, 0.7})};
+  EXPECT_TRUE(map_parts(parts, {1.0}, scene.queries(), {1e-4, 2000}));
+  EXPECT_LE(parts[0].map.code.size() * parts[0].map.bits / 8, 3000U);
 }
 
 TEST(VertexSamples, CatchASpikeBetweenTexels) {

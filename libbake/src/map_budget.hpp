@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "sqmap/asset/asset.hpp"
+
+#include "map_builder.hpp"
+
+namespace sqmap::bake {
+
+/// What the maps of an asset should reach and may cost.
+struct MapTarget {
+  double error_m;           ///< mean error over the object's surface
+  std::uint64_t max_bytes;  ///< of all maps in the file, about
+};
+
+/// Draws the maps of all parts with the fewest bytes in memory that meet the target together, each part
+/// counting by its `area_m2` of the mesh. What a byte is worth is the same everywhere (one Lagrange
+/// multiplier for all parts): a large smooth part may err more than the target so that a small rough one need
+/// not cost much, or the other way round. True: the byte budget, not the target, decided.
+bool map_parts(std::vector<Part>& parts, const std::vector<double>& area_m2, const MeshQueries& queries,
+               const MapTarget& target);
+
+}  // namespace sqmap::bake
