@@ -26,8 +26,9 @@
 namespace sqmap::io {
 namespace {
 
-constexpr std::size_t kMaxTextBytes = 64 * 1024;  // of one attribute; rule 4 allows less
+constexpr std::size_t kMaxTextBytes = std::size_t{64} * 1024;  // of one attribute; rule 4 allows less
 constexpr std::size_t kSuperblockBytes = 48;
+constexpr std::size_t kImageGrowBytes = std::size_t{64} * 1024;
 constexpr std::uint64_t kUndefinedAddress = ~std::uint64_t{0};
 constexpr const char* kRebake = "bake the asset again";
 
@@ -58,7 +59,7 @@ Outcome check_superblock(std::span<const std::uint8_t> bundle) {
 Hdf5Handle open_image(const std::string& name, std::span<const std::uint8_t> bundle) {
   const Hdf5Handle access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose);
   // HDF5 copies the image; its interface predates const.
-  if (H5Pset_fapl_core(access.get(), 64 * 1024, false) < 0 ||
+  if (H5Pset_fapl_core(access.get(), kImageGrowBytes, false) < 0 ||
       H5Pset_fclose_degree(access.get(), H5F_CLOSE_STRONG) < 0 ||
       H5Pset_file_image(access.get(), const_cast<std::uint8_t*>(bundle.data()), bundle.size()) < 0)
     return {};

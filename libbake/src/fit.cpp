@@ -47,7 +47,7 @@ constexpr double kAsGood = 0.02;
 constexpr double kOnSurface = 1e-4;
 constexpr double kNearSurface = 0.02;
 /// Through fewer points than this pass superquadrics that say nothing about the part (any 11 have one).
-constexpr std::size_t kDetermined = 3 * fit::kParameterCount;
+constexpr std::size_t kDetermined = std::size_t{3} * fit::kParameterCount;
 /// What the corners that no point samples may add to the log-volume of the smallest bound.
 constexpr double kUnsampled = 0.2;
 

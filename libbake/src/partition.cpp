@@ -145,7 +145,7 @@ std::vector<Cell> close_segments(SolidSet& set, const Solid& whole, const Decomp
       cell.solid = std::move(first);
       rest = std::move(second);
     } else {
-      cell.solid = std::move(rest);
+      cell.solid = rest;
     }
     cells.push_back(std::move(cell));
   }
