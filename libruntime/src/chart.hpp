@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// One part made ready for queries: layers 1, 2 and 3 in the part's own frame. Templated on the scalar, so
-// that the tests can hold the float runtime against the same lines in double.
+// The scalar reference of layers 1, 2 and 3 on one part. The SIMD engine (lanes.inl, look.inl) follows it
+// operation by operation and gives the same bits: change both. Part frame; lengths in units of
+// Resident::unit_m.
 #pragma once
 
 #include <algorithm>
@@ -9,334 +10,327 @@
 #include <cstdint>
 #include <limits>
 #include <utility>
-#include <vector>
 
-#include "sqmap/asset/asset.hpp"
 #include "sqmap/asset/shape_table.hpp"
 
+#include "powers.hpp"
+#include "resident.hpp"
 #include "triangle.hpp"
 
 namespace sqmap::runtime {
 
-/// The next float at or above a double.
-inline float rounded_up(double value) noexcept {
-  const float rounded = static_cast<float>(value);
-  return rounded < value ? std::nextafter(rounded, std::numeric_limits<float>::infinity()) : rounded;
-}
-
-/// What one chart knows of a point inside its superquadric; part frame.
-template <class T>
+/// What one chart knows of a point inside its superquadric.
 struct ChartAnswer {
-  bool inside{};  ///< by the parity of the crossings above the point
-  T certainty{};  ///< distance from the nearest crossing of the ray / doubt of that crossing [-]
-  T distance_m = std::numeric_limits<T>::infinity();  ///< to the represented surface; infinite: not eligible
-  Vec3<T> surface_m;                                  ///< nearest point found on it
-  Vec3<T> normal;                                     ///< outward unit normal there
-  T row{}, col{};                                     ///< layer 3: where on the map
-  bool behind_first{};  ///< layer 2: the nearest crossing is not the first of its ray
-  bool leaving{};       ///< layer 2: the ray leaves the material there
-  T offset_m{};  ///< delta of QueryOptions::edge_length_m for the edge length asked for; 0 on flat and hollow
-                 ///< surface
+  bool inside{};      ///< by the parity of the crossings above the point
+  float certainty{};  ///< distance from the nearest crossing of the ray / doubt of that crossing [-]
+  float distance =
+      std::numeric_limits<float>::infinity();  ///< to the represented surface; infinite: not eligible
+  Vec3f surface;                               ///< nearest point found on it
+  Vec3f normal;                                ///< outward unit normal there
+  float row{}, col{};                          ///< where on the map
+  bool behind_first{};                         ///< layer 2: the nearest crossing is not the first of its ray
+  bool leaving{};                              ///< layer 2: the ray leaves the material there
+  float offset{};      ///< delta of QueryOptions::edge_length_m; 0 on flat and hollow surface
   bool faces_patch{};  ///< layer 3: the nearest point lies within the represented surface, not on its rim
 };
 
-template <class T>
+// Numbers that the reference and the engine share.
+inline constexpr float kLeastDoubt = 1e-6F;  ///< of the part's sphere
+inline constexpr float kBesidePole =
+    0.05F;  ///< cells: on a pole the columns have no length, and no direction
+inline constexpr int kThirdLayerSteps =
+    6;  ///< Gauss-Newton converges in two or three; the rest crosses cells
+inline constexpr float kLeastAngle =
+    1e-6F;  ///< squared sine between rows and columns, below which one is a pole
+inline constexpr float kLeastCellStep = 1e-3F;  ///< cells: shorter steps end the search
+
+/// Layer 1: F(p) <= 1 (FORMAT.md S1), from powers of the unit coordinates.
+inline bool in_superquadric(const PartRecord& part, const Vec3f& p) noexcept {
+  const float x = std::abs(p.x) * part.inverse_axes.x, y = std::abs(p.y) * part.inverse_axes.y,
+              z = std::abs(p.z) * part.inverse_axes.z;
+  if (!(x <= 1.0F && y <= 1.0F && z <= 1.0F)) return false;
+  const float across = power_of(x, part.power_2) + power_of(y, part.power_2);
+  return power_of(across, part.power_ratio) + power_of(z, part.power_1) <= 1.0F;
+}
+
+/// Outward unit normal of the superquadric through p; zero at the centre.
+inline Vec3f shape_normal(const PartRecord& part, const Vec3f& p) noexcept {
+  const float x = std::abs(p.x) * part.inverse_axes.x, y = std::abs(p.y) * part.inverse_axes.y,
+              z = std::abs(p.z) * part.inverse_axes.z;
+  const float most = greater(x, y);
+  float u = 0, normal_x = 0, normal_y = 0;
+  if (most > 0) {
+    const float u_x = x / most, u_y = y / most;
+    const float size = power_of(power_of(u_x, part.power_2) + power_of(u_y, part.power_2), 1 / part.power_2);
+    u = most * size;
+    normal_x = power_of(u_x / size, part.power_2 - 1);
+    normal_y = power_of(u_y / size, part.power_2 - 1);
+  }
+  const float scale = greater(u, z);
+  if (!(scale > 0)) return {};
+  const float rim = power_of(u / scale, part.power_1 - 1);
+  return normalized(Vec3f{std::copysign(rim * normal_x * part.inverse_axes.x, p.x),
+                          std::copysign(rim * normal_y * part.inverse_axes.y, p.y),
+                          std::copysign(power_of(z / scale, part.power_1 - 1) * part.inverse_axes.z, p.z)});
+}
+
 class Chart {
  public:
-  explicit Chart(const Part& part)
-      : shape_{cast<T>(part.shape.semi_axes_m), static_cast<T>(part.shape.e1), static_cast<T>(part.shape.e2)},
-        object_from_part_(rotation<T>(part.object_from_part.orientation)),
-        translation_m_(cast<T>(part.object_from_part.translation_m)),
-        sphere_centre_m_(cast<T>(part.sphere.centre_m)),
-        sphere_radius_m_(rounded_up(part.sphere.radius_m)),
-        vertex_count_(part.vertex_count),
-        map_(part.map),
-        table_(part.shape, part.map.rows, part.map.cols) {}
+  Chart(const Resident& resident, const PartRecord& part) noexcept : resident_(resident), part_(part) {
+    resident.unpack(part, table_);
+  }
+  const ShapeTable<float>& table() const noexcept { return table_; }
 
-  const Vec3<T>& sphere_centre_m() const noexcept { return sphere_centre_m_; }
-  T sphere_radius_m() const noexcept { return sphere_radius_m_; }
-  std::uint32_t vertex_count() const noexcept { return vertex_count_; }
-  double texels_at(std::uint32_t level) const noexcept {
-    const std::uint32_t stride = stride_at(level);
-    return (static_cast<double>((map_.rows - 1) / stride) + 1) * (map_.cols / stride);
+  /// Layers 2 and 3 for a point inside the superquadric. edge > 0: also the offset for faces with such edges.
+  ChartAnswer look(const Vec3f& p, bool third, std::uint32_t level, float edge) const noexcept;
+  /// The end of layer 3 where cell (row, col) has a vertex sample; false: it has none. Level 0.
+  bool vertex_fan_at(const Vec3f& p, float row, float col, ChartAnswer& answer) const noexcept {
+    return vertex_fan(p, cell_at(row, col, 1), answer);
   }
-
-  Vec3<T> to_part(const Vec3<T>& p_m) const noexcept {
-    return object_from_part_.apply_inverse(p_m - translation_m_);
-  }
-  Vec3<T> to_object(const Vec3<T>& p_part_m) const noexcept {
-    return object_from_part_.apply(p_part_m) + translation_m_;
-  }
-  Vec3<T> to_object_direction(const Vec3<T>& d_part) const noexcept {
-    return object_from_part_.apply(d_part);
-  }
-
-  /// Layer 1.
-  T inside_outside_radial(const Vec3<T>& p_part_m) const noexcept {
-    return sqmap::inside_outside_radial(shape_, p_part_m);
-  }
-  Vec3<T> normal_at(const Vec3<T>& p_part_m) const noexcept { return sqmap::normal_at(shape_, p_part_m); }
-
-  /// Layers 2 and 3 for a point inside the superquadric. edge_m > 0: also the offset for faces with such
-  /// edges.
-  ChartAnswer<T> look(const Vec3<T>& p_part_m, bool third_layer, std::uint32_t level,
-                      T edge_m = T(0)) const noexcept;
-
-  std::size_t bytes() const noexcept {
-    return sizeof(*this) + table_.bytes() + map_.code.capacity() * sizeof(map_.code[0]) +
-           map_.start_inside.capacity() + map_.crossings.capacity() * sizeof(DistanceMap::Crossing) +
-           map_.vertex_samples.capacity() * sizeof(DistanceMap::VertexSample);
-  }
+  /// delta of QueryOptions::edge_length_m at a place of the map.
+  float offset(float row, float col, std::uint32_t level, float edge) const noexcept;
 
  private:
   /// A cell of the map at one level: its corners in row-major order and whether they bound a surface patch.
   struct Cell {
     std::uint32_t row, col;  // lowest corner, level-0 nodes
-    std::uint32_t texel[4];
+    std::uint32_t texel[4], code[4];
+    float depth[4];
+    bool starts[4];
     bool eligible;  // four corners hit the mesh from outside it
-    T depth_m[4];
   };
   /// The represented surface r - D n (paper eq. 22) at one place, with its derivatives.
   struct Patch {
-    Vec3<T> point_m, row_m, col_m;
+    Vec3f point, row, col;
   };
 
-  std::uint32_t stride_at(std::uint32_t level) const noexcept {
-    return 1U << std::min(level, map_.level_count - 1);
-  }
+  Cell cell_at(float row, float col, std::uint32_t stride) const noexcept;
+  Patch patch_at(const Cell& cell, float row, float col, std::uint32_t stride) const noexcept;
   /// Outward unit normal of the represented surface at (row, col) of the cell.
-  Vec3<T> patch_normal(const Cell& cell, T row, T col, std::uint32_t stride) const noexcept {
-    // On a pole the columns have no length, and the cross product no direction: look from a little beside it.
-    constexpr T kBesidePole = T(0.05);
-    const Patch patch =
-        patch_at(cell, std::clamp(row, kBesidePole, T(map_.rows - 1) - kBesidePole), col, stride);
-    return normalized(cross(patch.col_m, patch.row_m));
+  Vec3f patch_normal(const Cell& cell, float row, float col, std::uint32_t stride) const noexcept {
+    const float last = static_cast<float>(part_.rows - 1);
+    const Patch patch = patch_at(cell, lesser(greater(row, kBesidePole), last - kBesidePole), col, stride);
+    return normalized(cross(patch.col, patch.row));
   }
-  Cell cell_at(T row, T col, std::uint32_t stride) const noexcept;
-  Patch patch_at(const Cell& cell, T row, T col, std::uint32_t stride) const noexcept;
-  ChartAnswer<T> second_layer(const Foot<T>& foot, std::uint32_t stride) const noexcept;
-  void third_layer(const Vec3<T>& p, const Foot<T>& foot, std::uint32_t stride,
-                   ChartAnswer<T>& answer) const noexcept;
-  /// Largest convex curvature of the represented surface around (row, col) [1/m], at the resolution of the
-  /// cells; 0 where it is flat or hollow.
-  T convex_curvature(T row, T col, std::uint32_t stride) const noexcept;
-  void vertex_fan(const Vec3<T>& p, const Cell& cell, ChartAnswer<T>& answer) const noexcept;
+  Vec3f place(float row, float col, float depth) const noexcept {
+    const SurfaceSample<float> r = table_.sample(row, col);
+    return r.point_m - depth * r.normal;
+  }
+  ChartAnswer second_layer(const Foot<float>& foot, std::uint32_t stride) const noexcept;
+  void third_layer(const Vec3f& p, const Foot<float>& foot, std::uint32_t stride,
+                   ChartAnswer& answer) const noexcept;
+  bool vertex_fan(const Vec3f& p, const Cell& cell, ChartAnswer& answer) const noexcept;
+  /// Largest convex curvature of the represented surface around (row, col), at the resolution of the cells; 0
+  /// where it is flat or hollow.
+  float convex_curvature(float row, float col, std::uint32_t stride) const noexcept;
 
-  SuperquadricOf<T> shape_;
-  Rotation<T> object_from_part_;
-  Vec3<T> translation_m_, sphere_centre_m_;
-  T sphere_radius_m_;
-  std::uint32_t vertex_count_;
-  DistanceMap map_;
-  ShapeTable<T> table_;
+  const Resident& resident_;
+  const PartRecord& part_;
+  ShapeTable<float> table_;
 };
 
-template <class T>
-typename Chart<T>::Cell Chart<T>::cell_at(T row, T col, std::uint32_t stride) const noexcept {
+inline Chart::Cell Chart::cell_at(float row, float col, std::uint32_t stride) const noexcept {
   Cell cell;
-  const std::uint32_t last_row = map_.rows - 1 - stride;
-  cell.row = std::min(static_cast<std::uint32_t>(std::max(row, T(0))) / stride * stride, last_row);
-  cell.col = std::min(static_cast<std::uint32_t>(std::max(col, T(0))), map_.cols - 1) / stride * stride;
-  const std::uint32_t next_col = cell.col + stride < map_.cols ? cell.col + stride : 0;
-  cell.texel[0] = cell.row * map_.cols + cell.col;
-  cell.texel[1] = cell.row * map_.cols + next_col;
-  cell.texel[2] = cell.texel[0] + stride * map_.cols;
-  cell.texel[3] = cell.texel[1] + stride * map_.cols;
+  cell.row =
+      std::min(static_cast<std::uint32_t>(greater(row, 0.0F)) / stride * stride, part_.rows - 1 - stride);
+  cell.col = std::min(static_cast<std::uint32_t>(greater(col, 0.0F)), part_.cols - 1) / stride * stride;
+  const std::uint32_t next_col = cell.col + stride < part_.cols ? cell.col + stride : 0;
+  cell.texel[0] = cell.row * part_.cols + cell.col;
+  cell.texel[1] = cell.row * part_.cols + next_col;
+  cell.texel[2] = cell.texel[0] + stride * part_.cols;
+  cell.texel[3] = cell.texel[1] + stride * part_.cols;
   cell.eligible = true;
   for (int k = 0; k < 4; ++k) {
-    const std::uint16_t code = map_.code[cell.texel[k]];
-    cell.eligible = cell.eligible && code != map_.miss_code() && !map_.starts_inside(cell.texel[k]);
-    cell.depth_m[k] = static_cast<T>(map_.depth_m(code));
+    const std::uint32_t texel = resident_.texel(part_, cell.texel[k]);
+    cell.code[k] = texel & part_.miss_code;
+    cell.starts[k] = texel > part_.miss_code;
+    cell.depth[k] = part_.depth_of(cell.code[k]);
+    cell.eligible = cell.eligible && texel < part_.miss_code;
   }
   return cell;
 }
 
-template <class T>
-typename Chart<T>::Patch Chart<T>::patch_at(const Cell& cell, T row, T col,
-                                            std::uint32_t stride) const noexcept {
-  const T size = T(stride);
-  const T s = (row - T(cell.row)) / size, t = (col - T(cell.col)) / size;
-  const T low = cell.depth_m[0] + t * (cell.depth_m[1] - cell.depth_m[0]);
-  const T high = cell.depth_m[2] + t * (cell.depth_m[3] - cell.depth_m[2]);
-  const T depth = low + s * (high - low);
-  const T depth_row = (high - low) / size;
-  const T depth_col =
-      ((T(1) - s) * (cell.depth_m[1] - cell.depth_m[0]) + s * (cell.depth_m[3] - cell.depth_m[2])) / size;
-  const SurfaceSample<T> r = table_.sample(row, col);
+inline Chart::Patch Chart::patch_at(const Cell& cell, float row, float col,
+                                    std::uint32_t stride) const noexcept {
+  const float inverse = 1.0F / static_cast<float>(stride);  // a power of two: exact
+  const float s = (row - static_cast<float>(cell.row)) * inverse,
+              t = (col - static_cast<float>(cell.col)) * inverse;
+  const float rise_low = cell.depth[1] - cell.depth[0], rise_high = cell.depth[3] - cell.depth[2];
+  const float low = cell.depth[0] + t * rise_low, high = cell.depth[2] + t * rise_high;
+  const float depth = low + s * (high - low);
+  const float depth_row = (high - low) * inverse;
+  const float depth_col = (rise_low + s * (rise_high - rise_low)) * inverse;
+  const SurfaceSample<float> r = table_.sample(row, col);
   return {r.point_m - depth * r.normal, r.point_row_m - depth_row * r.normal - depth * r.normal_row,
           r.point_col_m - depth_col * r.normal - depth * r.normal_col};
 }
 
-template <class T>
-ChartAnswer<T> Chart<T>::look(const Vec3<T>& p_part_m, bool third, std::uint32_t level,
-                              T edge_m) const noexcept {
-  const std::uint32_t stride = stride_at(level);
-  const Foot<T> foot = table_.foot(p_part_m);
-  ChartAnswer<T> answer = second_layer(foot, stride);
+inline ChartAnswer Chart::look(const Vec3f& p, bool third, std::uint32_t level, float edge) const noexcept {
+  const std::uint32_t stride = part_.stride_at(level);
+  const Foot<float> foot = table_.foot(p);
+  ChartAnswer answer = second_layer(foot, stride);
   if (third) {
-    ChartAnswer<T> refined = answer;
-    third_layer(p_part_m, foot, stride, refined);
+    ChartAnswer refined = answer;
+    third_layer(p, foot, stride, refined);
     // A second sheet behind the first has no patch of its own: its ray distance stands where it is nearer.
-    if (!answer.behind_first || refined.distance_m < answer.distance_m) answer = refined;
+    if (!answer.behind_first || refined.distance < answer.distance) answer = refined;
   }
-  if (edge_m > T(0) && std::isfinite(answer.distance_m)) {
-    const T row = third ? answer.row : foot.row, col = third ? answer.col : foot.col;
-    const T bend = edge_m * convex_curvature(row, col, stride);  // L / rho
-    answer.offset_m = edge_m * bend / (T(3) * (T(1) + std::sqrt(T(1) + bend * bend / T(3))));
-  }
+  if (edge > 0 && std::isfinite(answer.distance)) answer.offset = offset(answer.row, answer.col, level, edge);
   return answer;
 }
 
-template <class T>
-T Chart<T>::convex_curvature(T row, T col, std::uint32_t stride) const noexcept {
+inline float Chart::offset(float row, float col, std::uint32_t level, float edge) const noexcept {
+  const float bend = edge * convex_curvature(row, col, part_.stride_at(level));  // L / rho
+  return edge * bend / (3.0F * (1.0F + std::sqrt(1.0F + bend * bend / 3.0F)));
+}
+
+inline float Chart::convex_curvature(float row, float col, std::uint32_t stride) const noexcept {
   // Differences between the centres of neighbouring cells, so that a crease between two cells counts as well.
   struct Centre {
-    Vec3<T> point_m, normal;
+    Vec3f point, normal;
     bool eligible;
   };
-  const T turn = T(map_.cols);
-  const auto centre_at = [&](T r, T c) {
-    const Cell cell = cell_at(r, c < T(0) ? c + turn : c < turn ? c : c - turn, stride);
-    const T half = T(stride) / T(2), mid_row = T(cell.row) + half, mid_col = T(cell.col) + half;
-    return Centre{patch_at(cell, mid_row, mid_col, stride).point_m,
+  const auto turn = static_cast<float>(part_.cols);
+  const auto centre_at = [&](float r, float c) {
+    const Cell cell = cell_at(r, c < 0 ? c + turn : c < turn ? c : c - turn, stride);
+    const float half = static_cast<float>(stride) / 2;
+    const float mid_row = static_cast<float>(cell.row) + half, mid_col = static_cast<float>(cell.col) + half;
+    return Centre{patch_at(cell, mid_row, mid_col, stride).point,
                   patch_normal(cell, mid_row, mid_col, stride), cell.eligible};
   };
-  const T step = T(stride);
-  T most = 0;
+  const auto step = static_cast<float>(stride);
+  const float last = static_cast<float>(part_.rows - 1) - 0.5F;
   const Centre here = centre_at(row, col);
-  const T last = T(map_.rows - 1) - T(0.5);
-  for (const auto& [dr, dc] : {std::pair{step, T(0)}, {-step, T(0)}, {T(0), step}, {T(0), -step}}) {
-    const Centre there = centre_at(std::clamp(row + dr, T(0), last), col + dc);
-    const Vec3<T> d = there.point_m - here.point_m;
-    const T square = dot(d, d);
-    if (!there.eligible || !(square > T(0))) continue;
-    most = std::max(most, dot(there.normal - here.normal, d) / square);
+  float most = 0;
+  for (const auto& [dr, dc] : {std::pair{step, 0.0F}, {-step, 0.0F}, {0.0F, step}, {0.0F, -step}}) {
+    const Centre there = centre_at(std::clamp(row + dr, 0.0F, last), col + dc);
+    const Vec3f d = there.point - here.point;
+    const float square = dot(d, d);
+    if (!there.eligible || !(square > 0)) continue;
+    most = greater(most, dot(there.normal - here.normal, d) / square);
   }
   return most;
 }
 
-template <class T>
-ChartAnswer<T> Chart<T>::second_layer(const Foot<T>& foot, std::uint32_t stride) const noexcept {
+inline ChartAnswer Chart::second_layer(const Foot<float>& foot, std::uint32_t stride) const noexcept {
   const Cell cell = cell_at(foot.row, foot.col, stride);
-  const SurfaceSample<T> r = table_.sample(foot.row, foot.col);
-  const T s = (foot.row - T(cell.row)) / T(stride), t = (foot.col - T(cell.col)) / T(stride);
-  const std::uint32_t nearest = cell.texel[(s < T(0.5) ? 0 : 2) + (t < T(0.5) ? 0 : 1)];
-  T shift_m = 0;  // of the nearest texel's crossings, so that the first of them is the interpolated one
-  T doubt_m;
+  const float inverse = 1.0F / static_cast<float>(stride);
+  const float s = (foot.row - static_cast<float>(cell.row)) * inverse;
+  const float t = (foot.col - static_cast<float>(cell.col)) * inverse;
+  const int nearest = (s < 0.5F ? 0 : 2) + (t < 0.5F ? 0 : 1);
+  const float* depth = cell.depth;
+  float shift = 0;  // of the nearest texel's crossings, so that the first of them is the interpolated one
+  float doubt;
   if (cell.eligible) {
-    const T low = cell.depth_m[0] + t * (cell.depth_m[1] - cell.depth_m[0]);
-    const T high = cell.depth_m[2] + t * (cell.depth_m[3] - cell.depth_m[2]);
-    shift_m = low + s * (high - low) - static_cast<T>(map_.depth_m(map_.code[nearest]));
-    const auto [least, most] = std::minmax_element(cell.depth_m, cell.depth_m + 4);
-    doubt_m = T(0.25) * (*most - *least) + static_cast<T>(map_.depth_step_m);
+    const float low = depth[0] + t * (depth[1] - depth[0]), high = depth[2] + t * (depth[3] - depth[2]);
+    shift = (low + s * (high - low)) - depth[nearest];
+    const float least = lesser(lesser(depth[0], depth[1]), lesser(depth[2], depth[3]));
+    const float most = greater(greater(depth[0], depth[1]), greater(depth[2], depth[3]));
+    doubt = 0.25F * (most - least) + part_.depth_step;
   } else {
-    doubt_m = (norm(r.point_col_m) + norm(r.point_row_m)) * T(stride);
+    doubt = foot.cell_m * static_cast<float>(stride);
   }
   // Where corners start on different sides of the mesh, the surface passes near the superquadric's own.
-  const bool start = map_.starts_inside(nearest);
-  bool one_start = true;
-  for (const std::uint32_t texel : cell.texel) one_start = one_start && map_.starts_inside(texel) == start;
+  const bool start = cell.starts[nearest];
+  const bool one_start = cell.starts[0] == start && cell.starts[1] == start && cell.starts[2] == start &&
+                         cell.starts[3] == start;
 
-  ChartAnswer<T> answer;
+  ChartAnswer answer;
+  answer.row = foot.row;
+  answer.col = foot.col;
   answer.inside = start;
-  T gap_m = std::numeric_limits<T>::infinity();  // to the nearest crossing
-  T crossing_m = 0;
+  float gap = std::numeric_limits<float>::infinity();  // to the nearest crossing
+  float crossing = 0;
   bool odd = false;
-  const auto pass = [&](std::uint16_t code) {
-    const T depth_m = static_cast<T>(map_.depth_m(code)) + shift_m;
-    if (depth_m < foot.depth_m) answer.inside = !answer.inside;
-    if (std::abs(depth_m - foot.depth_m) < gap_m) {
-      gap_m = std::abs(depth_m - foot.depth_m);
-      crossing_m = depth_m;
-      answer.behind_first = code != map_.code[nearest];
+  const auto pass = [&](float crossing_depth, bool is_first) {
+    if (crossing_depth < foot.depth_m) answer.inside = !answer.inside;
+    if (std::abs(crossing_depth - foot.depth_m) < gap) {
+      gap = std::abs(crossing_depth - foot.depth_m);
+      crossing = crossing_depth;
+      answer.behind_first = !is_first;
       answer.leaving = odd;
     }
     odd = !odd;
   };
-  if (map_.code[nearest] != map_.miss_code()) {
-    pass(map_.code[nearest]);
-    const auto less = [](const DistanceMap::Crossing& crossing, std::uint32_t texel) {
-      return crossing.texel < texel;
-    };
-    for (auto it = std::lower_bound(map_.crossings.begin(), map_.crossings.end(), nearest, less);
-         it != map_.crossings.end() && it->texel == nearest; ++it) {
-      pass(it->code);
+  if (cell.code[nearest] != part_.miss_code) {
+    pass(depth[nearest] + shift, true);
+    const std::uint32_t texel = cell.texel[nearest];
+    for (std::uint32_t k = resident_.find(part_.sheets, texel);
+         k < part_.sheets.count && resident_.key(part_.sheets, k) == texel; ++k) {
+      pass(part_.depth_of(resident_.sheet_code(part_, k)) + shift, false);
     }
   }
   // A ray without a crossing is as certain as the shape is large.
-  const T reach_m = one_start ? sphere_radius_m_ : std::max(foot.depth_m, T(0));
-  answer.certainty = std::min(gap_m, reach_m) / std::max(doubt_m, T(1e-6) * sphere_radius_m_);
-  if (!cell.eligible || !std::isfinite(gap_m)) return answer;
-  answer.distance_m = gap_m;
-  answer.surface_m = r.point_m - crossing_m * r.normal;
-  answer.normal = (answer.leaving ? T(-1) : T(1)) * patch_normal(cell, foot.row, foot.col, stride);
+  const float reach = one_start ? part_.sphere_radius : greater(foot.depth_m, 0.0F);
+  answer.certainty = lesser(gap, reach) / greater(doubt, kLeastDoubt * part_.sphere_radius);
+  if (!cell.eligible) return answer;
+  answer.distance = gap;
+  answer.surface = place(foot.row, foot.col, crossing);
+  answer.normal = (answer.leaving ? -1.0F : 1.0F) * patch_normal(cell, foot.row, foot.col, stride);
   return answer;
 }
 
-template <class T>
-void Chart<T>::third_layer(const Vec3<T>& p, const Foot<T>& foot, std::uint32_t stride,
-                           ChartAnswer<T>& answer) const noexcept {
-  constexpr int kSteps = 6;  // Gauss-Newton converges in two or three; the rest crosses cells
-  T row = foot.row, col = foot.col;
+inline void Chart::third_layer(const Vec3f& p, const Foot<float>& foot, std::uint32_t stride,
+                               ChartAnswer& answer) const noexcept {
+  float row = foot.row, col = foot.col;
   Cell cell = cell_at(row, col, stride);
   if (!cell.eligible) return;
-  const T last_row = T(map_.rows - 1), turn = T(map_.cols);
-  T best_square = std::numeric_limits<T>::infinity();
+  const auto last_row = static_cast<float>(part_.rows - 1), turn = static_cast<float>(part_.cols);
+  const auto most_row = static_cast<float>(stride);
+  const float last_col = std::nextafter(turn, 0.0F);
+  float best_square = std::numeric_limits<float>::infinity();
   Cell best_cell = cell;
   bool on_rim = false, best_on_rim = false;
-  Vec3<T> best_point_m;
-  T best_row = row, best_col = col;
-  for (int step = 0; step <= kSteps; ++step) {
+  Vec3f best_point;
+  float best_row = row, best_col = col;
+  for (int step = 0; step <= kThirdLayerSteps; ++step) {
     const Patch patch = patch_at(cell, row, col, stride);
-    const Vec3<T> error_m = p - patch.point_m;
-    const T square = dot(error_m, error_m);
+    const Vec3f error = p - patch.point;
+    const float square = dot(error, error);
     if (square < best_square) {
       best_square = square;
-      best_point_m = patch.point_m;
+      best_point = patch.point;
       best_cell = cell;
       best_row = row;
       best_col = col;
       best_on_rim = on_rim;
     }
-    const T a = dot(patch.row_m, patch.row_m), b = dot(patch.row_m, patch.col_m),
-            c = dot(patch.col_m, patch.col_m);
-    const T f = dot(patch.row_m, error_m), g = dot(patch.col_m, error_m);
-    const T determinant = a * c - b * b;
-    T d_row = 0, d_col = 0;
-    if (determinant > T(1e-6) * a * c) {
-      d_row = (c * f - b * g) / determinant;
-      d_col = (a * g - b * f) / determinant;
-    } else if (a > T(0)) {
-      d_row = f / a;  // a pole: columns have no length
-    }
+    const float a = dot(patch.row, patch.row), b = dot(patch.row, patch.col), c = dot(patch.col, patch.col);
+    const float f = dot(patch.row, error), g = dot(patch.col, error);
+    const float product = a * c, determinant = product - b * b;
+    const bool regular = determinant > kLeastAngle * product;
+    const bool rows_only = !regular && a > 0;  // a pole: columns have no length
+    const float inverse = 1.0F / (regular ? determinant : rows_only ? a : 1.0F);
+    float d_row = regular ? (c * f - b * g) * inverse : rows_only ? f * inverse : 0.0F;
+    float d_col = regular ? (a * g - b * f) * inverse : 0.0F;
     // At most one cell a step; beside a pole, where columns are short, as far as one row is long.
-    const T most_row = T(stride);
-    const T most_col =
-        std::min(turn / T(8), most_row * std::max(T(1), std::sqrt(a / std::max(c, T(1e-6) * a))));
-    d_row = std::clamp(d_row, -most_row, most_row);
-    d_col = std::clamp(d_col, -most_col, most_col);
-    if (std::abs(d_row) + std::abs(d_col) < T(1e-3)) break;
-    T next_row = std::clamp(row + d_row, T(0), last_row);
-    T next_col = col + d_col;
-    if (next_col < T(0)) next_col += turn;
-    if (!(next_col < turn)) next_col = next_col - turn;
+    const float slimness =
+        std::sqrt(a / greater(greater(c, kLeastAngle * a), std::numeric_limits<float>::min()));
+    const float most_col = lesser(turn * 0.125F, most_row * greater(slimness, 1.0F));
+    d_row = lesser(greater(d_row, -most_row), most_row);
+    d_col = lesser(greater(d_col, -most_col), most_col);
+    if (std::abs(d_row) + std::abs(d_col) < kLeastCellStep) break;
+    const float next_row = lesser(greater(row + d_row, 0.0F), last_row);
+    float next_col = col + d_col;
+    next_col = next_col < 0.0F ? next_col + turn : next_col;
+    next_col = next_col < turn ? next_col : next_col - turn;
     const Cell next = cell_at(next_row, next_col, stride);
+    on_rim = !next.eligible;
     if (next.eligible) {
       cell = next;
       row = next_row;
       col = next_col;
-      on_rim = false;
     } else {  // stay on the rim of the patch
-      on_rim = true;
-      const T rim_row = std::clamp(row + d_row, T(cell.row), T(cell.row + stride));
-      const T rim_col = std::clamp(col + d_col, T(cell.col), T(cell.col + stride));
-      if (rim_row == row && rim_col == col) break;
+      const auto low_row = static_cast<float>(cell.row), low_col = static_cast<float>(cell.col);
+      const float rim_row = lesser(greater(row + d_row, low_row), low_row + most_row);
+      const float rim_col = lesser(greater(col + d_col, low_col), low_col + most_row);
+      if (std::abs(rim_row - row) + std::abs(rim_col - col) < kLeastCellStep) break;
       row = rim_row;
-      col = std::min(rim_col, std::nextafter(turn, T(0)));
+      col = lesser(rim_col, last_col);
     }
   }
-  answer.distance_m = std::sqrt(best_square);
-  answer.surface_m = best_point_m;
+  answer.distance = std::sqrt(best_square);
+  answer.surface = best_point;
   answer.faces_patch = !best_on_rim;
   answer.row = best_row;
   answer.col = best_col;
@@ -344,39 +338,33 @@ void Chart<T>::third_layer(const Vec3<T>& p, const Foot<T>& foot, std::uint32_t 
   if (stride == 1) vertex_fan(p, best_cell, answer);
 }
 
-template <class T>
-void Chart<T>::vertex_fan(const Vec3<T>& p, const Cell& cell, ChartAnswer<T>& answer) const noexcept {
-  const auto less = [](const DistanceMap::VertexSample& sample, std::uint32_t texel) {
-    return sample.cell < texel;
-  };
-  const auto it =
-      std::lower_bound(map_.vertex_samples.begin(), map_.vertex_samples.end(), cell.texel[0], less);
-  if (it == map_.vertex_samples.end() || it->cell != cell.texel[0]) return;
-  const auto place = [&](T row, T col, T depth) {
-    const SurfaceSample<T> r = table_.sample(row, col);
-    return r.point_m - depth * r.normal;
-  };
-  const Vec3<T> apex =
-      place(T(cell.row) + T(it->row_256ths) / T(256), T(cell.col) + T(it->col_256ths) / T(256),
-            static_cast<T>(map_.depth_m(it->code)));
+inline bool Chart::vertex_fan(const Vec3f& p, const Cell& cell, ChartAnswer& answer) const noexcept {
+  const std::uint32_t position = resident_.find(part_.fans, cell.texel[0]);
+  if (position >= part_.fans.count || resident_.key(part_.fans, position) != cell.texel[0]) return false;
+  const std::uint32_t where = resident_.fan_place(part_, position);
+  const auto low = static_cast<float>(cell.row), left = static_cast<float>(cell.col);
+  const float top = low + 1.0F, right = left + 1.0F;
+  const Vec3f apex = place(low + static_cast<float>(where & 255U) * (1 / 256.0F),
+                           left + static_cast<float>(where >> 8U) * (1 / 256.0F),
+                           part_.depth_of(resident_.fan_code(part_, position)));
   // Corners counter-clockwise seen from outside: rows grow upwards, columns to the right.
-  const T top = T(cell.row + 1), right = T(cell.col + 1);
-  const Vec3<T> corner[4] = {place(T(cell.row), T(cell.col), cell.depth_m[0]),
-                             place(T(cell.row), right, cell.depth_m[1]), place(top, right, cell.depth_m[3]),
-                             place(top, T(cell.col), cell.depth_m[2])};
-  T best_square = std::numeric_limits<T>::infinity();
+  const Vec3f corner[4] = {place(low, left, cell.depth[0]), place(low, right, cell.depth[1]),
+                           place(top, right, cell.depth[3]), place(top, left, cell.depth[2])};
+  float best_square = std::numeric_limits<float>::infinity();
   for (int k = 0; k < 4; ++k) {
-    const Vec3<T>& a = corner[k];
-    const Vec3<T>& b = corner[(k + 1) % 4];
-    const Vec3<T> nearest = nearest_on_triangle(p, a, b, apex);
-    const Vec3<T> d = p - nearest;
-    if (dot(d, d) < best_square) {
-      best_square = dot(d, d);
-      answer.distance_m = std::sqrt(best_square);
-      answer.surface_m = nearest;
+    const Vec3f& a = corner[k];
+    const Vec3f& b = corner[(k + 1) % 4];
+    const Vec3f nearest = nearest_on_triangle(p, a, b, apex);
+    const Vec3f d = p - nearest;
+    const float square = dot(d, d);
+    if (square < best_square) {
+      best_square = square;
+      answer.surface = nearest;
       answer.normal = normalized(cross(b - a, apex - a));
     }
   }
+  answer.distance = std::sqrt(best_square);
+  return true;
 }
 
 }  // namespace sqmap::runtime

@@ -2,15 +2,24 @@
 #pragma once
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstdint>
-#include <vector>
+#include <limits>
 
 #include "sqmap/asset/map_grid.hpp"
 #include "sqmap/asset/superquadric.hpp"
 
 namespace sqmap {
+
+/// The lesser and the greater of two numbers, b where they are equal or one is NaN: what SIMD units compute.
+template <class T>
+constexpr T lesser(T a, T b) noexcept {
+  return a < b ? a : b;
+}
+template <class T>
+constexpr T greater(T a, T b) noexcept {
+  return a > b ? a : b;
+}
 
 /// Foot point of a query on a superquadric, in the coordinates of its map.
 template <class T>
@@ -18,6 +27,7 @@ struct Foot {
   T row{};      ///< [cells of level 0], in [0, rows - 1]
   T col{};      ///< [cells of level 0], in [0, cols)
   T depth_m{};  ///< S: distance from the surface along the inward normal; negative outside
+  T cell_m{};   ///< |dr/drow| + |dr/dcol| there: height and width of a cell [m]
 };
 
 /// The superquadric's surface at one place of its map, with derivatives along the map's coordinates. Part
@@ -32,146 +42,179 @@ struct SurfaceSample {
   Vec3<T> normal_col;   ///< dn/dcol [1/cell]
 };
 
-/// Tables that answer, without powers, where the foot point of a query lies and what the surface is there.
-/// One of the two 1-D tables runs over eta, one over omega, one quadrant each: r(eta, omega) is a product of
-/// the two.
-///
-/// The nodes are those of the map, subdivided to at least kMinCells arcs a quadrant, with cubic Hermite
-/// interpolation between them. Immutable, thread-safe; nothing here allocates but the constructor.
+/// One quadrant of a superellipse as kCells cubic Hermite arcs of equal length. `position` runs from 0 at
+/// (1, 0) to kCells at (0, 1).
 template <class T>
-class ShapeTable {
- public:
-  static constexpr std::uint32_t kMinCells = 32;
+struct CurveTable {
+  static constexpr int kCells = 32;
 
-  ShapeTable(const Superquadric& shape, std::uint32_t rows, std::uint32_t cols);
+  T c[kCells + 1], s[kCells + 1];            ///< the curve
+  T c_step[kCells + 1], s_step[kCells + 1];  ///< its derivative along the position
+
+  /// A place of the curve with first and second derivatives along the position.
+  struct Place {
+    T c, s, c_1, s_1, c_2, s_2;
+  };
+  Place at(T position) const noexcept {
+    const int k = std::clamp(static_cast<int>(position), 0, kCells - 1);
+    const T t = position - T(k);
+    Place place;
+    hermite(c[k], c[k + 1], c_step[k], c_step[k + 1], t, place.c, place.c_1, place.c_2);
+    hermite(s[k], s[k + 1], s_step[k], s_step[k + 1], t, place.s, place.s_1, place.s_2);
+    return place;
+  }
+
+  /// The superellipse with semi-axes alpha and beta and exponent e.
+  static CurveTable of(double alpha_m, double beta_m, double e) {
+    const auto points = quadrant_nodes(alpha_m, beta_m, e, kCells);
+    double length_m = 0;
+    for (int k = 0; k < kCells; ++k) {
+      length_m +=
+          std::hypot(alpha_m * (points[k + 1].c - points[k].c), beta_m * (points[k + 1].s - points[k].s));
+    }
+    CurveTable table;
+    for (int k = 0; k <= kCells; ++k) {
+      // The tangent is (-s_power, c_power) in unit coordinates; scaled so that its length is one arc.
+      const auto& p = points[k];
+      const double speed = length_m / kCells / std::hypot(alpha_m * p.s_power, beta_m * p.c_power);
+      table.c[k] = T(p.c);
+      table.s[k] = T(p.s);
+      table.c_step[k] = T(-p.s_power * speed);
+      table.s_step[k] = T(p.c_power * speed);
+    }
+    return table;
+  }
+
+ private:
+  static void hermite(T a, T b, T a_step, T b_step, T t, T& value, T& first, T& second) noexcept {
+    const T rise = b - a;
+    const T cubic = (a_step + b_step) - (rise + rise);
+    const T square = (rise - a_step) - cubic;
+    value = a + t * (a_step + t * (square + t * cubic));
+    first = a_step + t * ((square + square) + t * (T(3) * cubic));
+    second = (square + square) + t * (T(6) * cubic);
+  }
+};
+
+/// Tables that answer, without powers, where the foot point of a query lies and what the surface is there:
+/// r(eta, omega) is a product of two 1-D curves. Every operation is one that IEEE 754 rounds exactly, in an
+/// order that the runtime's SIMD kernels follow, so that their answers equal these to the last bit.
+/// Immutable once prepared, thread-safe, allocates nothing.
+template <class T>
+struct ShapeTable {
+  static constexpr int kCells = CurveTable<T>::kCells;
+  static constexpr int kScan = 8;         ///< start points of the foot search a side of the octant
+  static constexpr int kNewtonSteps = 3;  ///< of the foot search
+  static constexpr T kMostStep = 4;  ///< of one Newton step [table cells]: the spacing of the start points
+  static constexpr T kLeastCurvature =
+      T(0.2);  ///< of the squared distance, as a share of the tangents' squares
+  static constexpr T kLeastDeterminant =
+      T(0.03);  ///< below this share of the diagonal's product: two 1-D steps
+
+  /// The node of the curves where start point k lies.
+  static constexpr int scan_node(int k) noexcept { return kCells / kScan * k + kCells / kScan / 2; }
+
+  ShapeTable() = default;
+  ShapeTable(const Superquadric& shape, std::uint32_t rows, std::uint32_t cols) {
+    eta = CurveTable<T>::of(std::sqrt(shape.semi_axes_m.x * shape.semi_axes_m.y), shape.semi_axes_m.z,
+                            shape.e1);
+    omega = CurveTable<T>::of(shape.semi_axes_m.x, shape.semi_axes_m.y, shape.e2);
+    prepare(cast<T>(shape.semi_axes_m), rows, cols);
+  }
+  /// Sets all but the curves.
+  void prepare(const Vec3<T>& semi_axes_m, std::uint32_t rows, std::uint32_t cols) noexcept;
 
   /// The nearest point of the surface to m (part frame, any finite point), as S, row and col.
   ///
   /// The paper maximises the cosine I_S of eq. (19), which has several maxima and is 0/0 on the surface; here
-  /// the squared distance is minimised. By symmetry the foot lies in the octant of m. Every local minimum of
-  /// a 5 x 5 scan of that octant is followed down through halved steps of the tables; the best one is refined
-  /// by a quadratic through its 3 x 3 neighbours.
+  /// the squared distance is minimised. By symmetry the foot lies in the octant of m. The nearest of 8 x 8
+  /// points of that octant is refined by Newton's method on the continuous surface, kept downhill by bounds
+  /// on the curvature and on the step.
   Foot<T> foot(const Vec3<T>& m) const noexcept;
 
   /// The surface at (row, col), row in [0, rows - 1], col taken modulo cols.
   SurfaceSample<T> sample(T row, T col) const noexcept;
 
-  std::size_t bytes() const noexcept { return (eta_.capacity() + omega_.capacity()) * sizeof(Node); }
+  Vec3<T> axes_m, inverse_axes;
+  T half_rows, quarter_cols;     ///< map cells a quadrant
+  T eta_per_row, omega_per_col;  ///< table cells a map cell
+  T row_per_eta, col_per_omega;
+  CurveTable<T> eta, omega;
+
+  /// Constants of the foot search: |r - m|^2 over (i, j) is least where
+  /// c_i (W_j - c_i square_j / 2) + z_i m_z - z_i^2 / 2  is greatest, W_j = x_j m_x + y_j m_y.
+  struct Scan {
+    T x_m[kScan], y_m[kScan], c[kScan], z_m[kScan], half_z_square_m2[kScan];
+    T half_square_m2[kScan][kScan];  ///< [i][j] c_i (x_j^2 + y_j^2) / 2
+  };
+  Scan scan;
 
  private:
-  struct Node {
-    T c, s;              // superellipse point
-    T c_power, s_power;  // its normal, unnormalised
-    T c_step, s_step;    // d(c, s) a table cell
-  };
-  struct Curve {
-    T c, s, c_power, s_power, c_step, s_step, c_power_step, s_power_step;
-  };
-  struct Candidate {
-    int i, j;
-    T square;
-  };
-
-  static std::vector<Node> make_nodes(double alpha_m, double beta_m, double e, std::uint32_t cells);
-  static Curve interpolate(const std::vector<Node>& nodes, T position) noexcept;
-  T square_at(int i, int j, const Vec3<T>& m) const noexcept;
-  Candidate descend(Candidate start, int stride_i, int stride_j, const Vec3<T>& m) const noexcept;
-
-  Vec3<T> axes_m_, inverse_axes_;
-  T half_rows_, quarter_cols_;     // map cells a quadrant
-  T eta_per_row_, omega_per_col_;  // table cells a map cell
-  std::vector<Node> eta_, omega_;  // [eta cells + 1], [omega cells + 1]
+  void newton_step(const Vec3<T>& m, T& u, T& v) const noexcept;
+  /// Unnormalised outward normal in the octant: the cross product of the tangents without the factor c of
+  /// eta.
+  Vec3<T> gradient(const typename CurveTable<T>::Place& e,
+                   const typename CurveTable<T>::Place& o) const noexcept {
+    const T w = o.c * o.s_1 - o.s * o.c_1;
+    return {(e.s_1 * o.s_1) * inverse_axes.x, (e.s_1 * -o.c_1) * inverse_axes.y,
+            (-e.c_1 * w) * inverse_axes.z};
+  }
 };
 
 template <class T>
-std::vector<typename ShapeTable<T>::Node> ShapeTable<T>::make_nodes(double alpha_m, double beta_m, double e,
-                                                                    std::uint32_t cells) {
-  const auto points = quadrant_nodes(alpha_m, beta_m, e, cells);
-  double length_m = 0;
-  for (std::uint32_t k = 0; k < cells; ++k) {
-    length_m +=
-        std::hypot(alpha_m * (points[k + 1].c - points[k].c), beta_m * (points[k + 1].s - points[k].s));
+void ShapeTable<T>::prepare(const Vec3<T>& semi_axes_m, std::uint32_t rows, std::uint32_t cols) noexcept {
+  axes_m = semi_axes_m;
+  inverse_axes = {T(1) / axes_m.x, T(1) / axes_m.y, T(1) / axes_m.z};
+  half_rows = T(rows - 1) / T(2);
+  quarter_cols = T(cols) / T(4);
+  eta_per_row = T(kCells) / half_rows;
+  omega_per_col = T(kCells) / quarter_cols;
+  row_per_eta = half_rows / T(kCells);
+  col_per_omega = quarter_cols / T(kCells);
+  for (int k = 0; k < kScan; ++k) {
+    const int node = scan_node(k);
+    scan.x_m[k] = axes_m.x * omega.c[node];
+    scan.y_m[k] = axes_m.y * omega.s[node];
+    scan.c[k] = eta.c[node];
+    scan.z_m[k] = axes_m.z * eta.s[node];
+    scan.half_z_square_m2[k] = T(0.5) * scan.z_m[k] * scan.z_m[k];
   }
-  std::vector<Node> nodes;
-  nodes.reserve(points.size());
-  for (const auto& p : points) {
-    // The tangent is (-s_power, c_power) in unit coordinates; scaled so that its length is one arc.
-    const double speed = length_m / cells / std::hypot(alpha_m * p.s_power, beta_m * p.c_power);
-    nodes.push_back(
-        {T(p.c), T(p.s), T(p.c_power), T(p.s_power), T(-p.s_power * speed), T(p.c_power * speed)});
-  }
-  return nodes;
-}
-
-template <class T>
-ShapeTable<T>::ShapeTable(const Superquadric& shape, std::uint32_t rows, std::uint32_t cols)
-    : axes_m_(cast<T>(shape.semi_axes_m)),
-      inverse_axes_{T(1 / shape.semi_axes_m.x), T(1 / shape.semi_axes_m.y), T(1 / shape.semi_axes_m.z)},
-      half_rows_(T(rows - 1) / T(2)),
-      quarter_cols_(T(cols) / T(4)) {
-  const std::uint32_t half = (rows - 1) / 2, quarter = cols / 4;
-  const std::uint32_t eta_factor = (kMinCells + half - 1) / half;
-  const std::uint32_t omega_factor = (kMinCells + quarter - 1) / quarter;
-  eta_per_row_ = T(eta_factor);
-  omega_per_col_ = T(omega_factor);
-  eta_ = make_nodes(std::sqrt(shape.semi_axes_m.x * shape.semi_axes_m.y), shape.semi_axes_m.z, shape.e1,
-                    half * eta_factor);
-  omega_ = make_nodes(shape.semi_axes_m.x, shape.semi_axes_m.y, shape.e2, quarter * omega_factor);
-}
-
-template <class T>
-typename ShapeTable<T>::Curve ShapeTable<T>::interpolate(const std::vector<Node>& nodes,
-                                                         T position) noexcept {
-  const int last = static_cast<int>(nodes.size()) - 2;
-  const int k = std::clamp(static_cast<int>(position), 0, last);
-  const T t = position - T(k);
-  const Node& a = nodes[k];
-  const Node& b = nodes[k + 1];
-  const T u = T(1) - t;
-  const T h01 = t * t * (T(3) - T(2) * t), h00 = T(1) - h01, h10 = t * u * u, h11 = -t * t * u;
-  const T d01 = T(6) * t * u, d10 = u * (T(1) - T(3) * t), d11 = t * (T(3) * t - T(2));
-  Curve curve;
-  curve.c = h00 * a.c + h01 * b.c + h10 * a.c_step + h11 * b.c_step;
-  curve.s = h00 * a.s + h01 * b.s + h10 * a.s_step + h11 * b.s_step;
-  curve.c_step = d01 * (b.c - a.c) + d10 * a.c_step + d11 * b.c_step;
-  curve.s_step = d01 * (b.s - a.s) + d10 * a.s_step + d11 * b.s_step;
-  curve.c_power = a.c_power + t * (b.c_power - a.c_power);
-  curve.s_power = a.s_power + t * (b.s_power - a.s_power);
-  curve.c_power_step = b.c_power - a.c_power;
-  curve.s_power_step = b.s_power - a.s_power;
-  return curve;
-}
-
-template <class T>
-T ShapeTable<T>::square_at(int i, int j, const Vec3<T>& m) const noexcept {
-  const T x = axes_m_.x * eta_[i].c * omega_[j].c - m.x;
-  const T y = axes_m_.y * eta_[i].c * omega_[j].s - m.y;
-  const T z = axes_m_.z * eta_[i].s - m.z;
-  return x * x + y * y + z * z;
-}
-
-template <class T>
-typename ShapeTable<T>::Candidate ShapeTable<T>::descend(Candidate best, int stride_i, int stride_j,
-                                                         const Vec3<T>& m) const noexcept {
-  const int last_i = static_cast<int>(eta_.size()) - 1, last_j = static_cast<int>(omega_.size()) - 1;
-  constexpr int kMovesPerLevel = 8;  // bounds the time; two suffice on all but needles
-  while (stride_i > 1 || stride_j > 1) {
-    stride_i = std::max(1, stride_i / 2);
-    stride_j = std::max(1, stride_j / 2);
-    for (int move = 0; move < kMovesPerLevel; ++move) {
-      const Candidate centre = best;
-      for (int di = -1; di <= 1; ++di) {
-        for (int dj = -1; dj <= 1; ++dj) {
-          const int i = std::clamp(centre.i + di * stride_i, 0, last_i);
-          const int j = std::clamp(centre.j + dj * stride_j, 0, last_j);
-          const T square = square_at(i, j, m);
-          if (square < best.square) best = {i, j, square};
-        }
-      }
-      if (best.i == centre.i && best.j == centre.j) break;
+  for (int i = 0; i < kScan; ++i) {
+    const T half = T(0.5) * scan.c[i];
+    for (int j = 0; j < kScan; ++j) {
+      scan.half_square_m2[i][j] = half * (scan.x_m[j] * scan.x_m[j] + scan.y_m[j] * scan.y_m[j]);
     }
   }
-  return best;
+}
+
+template <class T>
+void ShapeTable<T>::newton_step(const Vec3<T>& m, T& u, T& v) const noexcept {
+  const auto e = eta.at(u), o = omega.at(v);
+  // r = (x e.c, y e.c, z e.s) and derivatives; d = r - m.
+  const T x = axes_m.x * o.c, y = axes_m.y * o.s;
+  const T x_1 = axes_m.x * o.c_1, y_1 = axes_m.y * o.s_1;
+  const T x_2 = axes_m.x * o.c_2, y_2 = axes_m.y * o.s_2;
+  const T z_1 = axes_m.z * e.s_1, z_2 = axes_m.z * e.s_2;
+  const T dx = x * e.c - m.x, dy = y * e.c - m.y, dz = axes_m.z * e.s - m.z;
+  const T along = dx * x + dy * y, along_1 = dx * x_1 + dy * y_1, along_2 = dx * x_2 + dy * y_2;
+  const T g_u = e.c_1 * along + dz * z_1;
+  const T g_v = e.c * along_1;
+  const T t_uu = (e.c_1 * e.c_1) * (x * x + y * y) + z_1 * z_1;
+  const T t_vv = (e.c * e.c) * (x_1 * x_1 + y_1 * y_1);
+  const T h_uu = greater(t_uu + (e.c_2 * along + dz * z_2), kLeastCurvature * t_uu);
+  T h_vv = greater(t_vv + e.c * along_2, kLeastCurvature * t_vv);
+  h_vv = h_vv > T(0) ? h_vv : T(1);  // a pole: g_v is 0 too
+  const T h_uv = e.c_1 * (e.c * (x * x_1 + y * y_1) + along_1);
+  const T product = h_uu * h_vv;
+  const T determinant = product - h_uv * h_uv;
+  // A share of the diagonal product keeps nearly singular systems (poles, medial axis) out of the 2-D step.
+  const bool regular = determinant > kLeastDeterminant * product;
+  const T coupling = regular ? h_uv : T(0);
+  const T inverse = T(1) / (regular ? determinant : product);
+  const T du = (coupling * g_v - h_vv * g_u) * inverse;
+  const T dv = (coupling * g_u - h_uu * g_v) * inverse;
+  u = lesser(greater(u + lesser(greater(du, -kMostStep), kMostStep), T(0)), T(kCells));
+  v = lesser(greater(v + lesser(greater(dv, -kMostStep), kMostStep), T(0)), T(kCells));
 }
 
 template <class T>
@@ -179,129 +222,95 @@ Foot<T> ShapeTable<T>::foot(const Vec3<T>& point) const noexcept {
   using std::abs;
   using std::sqrt;
   const Vec3<T> m{abs(point.x), abs(point.y), abs(point.z)};
-  const int last_i = static_cast<int>(eta_.size()) - 1, last_j = static_cast<int>(omega_.size()) - 1;
-
-  constexpr int kScan = 4;  // scan cells a side of the octant
-  std::array<Candidate, (kScan + 1) * (kScan + 1)> scan;
-  for (int a = 0; a <= kScan; ++a) {
-    for (int b = 0; b <= kScan; ++b) {
-      const int i = a * last_i / kScan, j = b * last_j / kScan;
-      scan[a * (kScan + 1) + b] = {i, j, square_at(i, j, m)};
-    }
-  }
-  Candidate best{0, 0, scan[0].square};
-  bool first = true;
-  for (int a = 0; a <= kScan; ++a) {
-    for (int b = 0; b <= kScan; ++b) {
-      const Candidate& here = scan[a * (kScan + 1) + b];
-      bool lowest = true;
-      for (int da = std::max(-1, -a); da <= std::min(1, kScan - a); ++da) {
-        for (int db = std::max(-1, -b); db <= std::min(1, kScan - b); ++db) {
-          lowest = lowest && !(scan[(a + da) * (kScan + 1) + b + db].square < here.square);
-        }
+  T along[kScan];
+  for (int j = 0; j < kScan; ++j) along[j] = scan.x_m[j] * m.x + scan.y_m[j] * m.y;
+  T u = 0, v = 0, most = -std::numeric_limits<T>::infinity();
+  for (int i = 0; i < kScan; ++i) {
+    T row_most = along[0] - scan.half_square_m2[i][0];
+    T row_v = T(scan_node(0));
+    for (int j = 1; j < kScan; ++j) {
+      const T here = along[j] - scan.half_square_m2[i][j];
+      if (here > row_most) {
+        row_most = here;
+        row_v = T(scan_node(j));
       }
-      if (!lowest) continue;
-      const Candidate found = descend(here, (last_i + kScan - 1) / kScan, (last_j + kScan - 1) / kScan, m);
-      if (first || found.square < best.square) best = found;
-      first = false;
+    }
+    const T here = scan.c[i] * row_most + (scan.z_m[i] * m.z - scan.half_z_square_m2[i]);
+    if (here > most) {
+      most = here;
+      u = T(scan_node(i));
+      v = row_v;
     }
   }
+  for (int step = 0; step < kNewtonSteps; ++step) newton_step(m, u, v);
 
-  // Quadratic through the 3 x 3 neighbours; across a plane of symmetry the neighbour is the mirror image.
-  const auto square_beside = [&](int i, int j) {
-    Vec3<T> mirrored = m;
-    if (i < 0) i = -i, mirrored.z = -m.z;
-    if (i > last_i) i = 2 * last_i - i, mirrored.x = -mirrored.x, mirrored.y = -mirrored.y;
-    if (j < 0) j = -j, mirrored.y = -mirrored.y;
-    if (j > last_j) j = 2 * last_j - j, mirrored.x = -mirrored.x;
-    return square_at(i, j, mirrored);
-  };
-  const T f0 = best.square;
-  const T fn = square_beside(best.i - 1, best.j), fs = square_beside(best.i + 1, best.j);
-  const T fw = square_beside(best.i, best.j - 1), fe = square_beside(best.i, best.j + 1);
-  const T g_i = (fs - fn) / T(2), g_j = (fe - fw) / T(2);
-  const T h_ii = fs + fn - T(2) * f0, h_jj = fe + fw - T(2) * f0;
-  const T h_ij = (square_beside(best.i + 1, best.j + 1) - square_beside(best.i + 1, best.j - 1) -
-                  square_beside(best.i - 1, best.j + 1) + square_beside(best.i - 1, best.j - 1)) /
-                 T(4);
-  const T determinant = h_ii * h_jj - h_ij * h_ij;
-  T step_i = 0, step_j = 0;
-  // A share of the diagonal product keeps nearly singular systems (poles, medial axis) out of the 2-D step.
-  if (determinant > T(1e-3) * h_ii * h_jj && h_ii > T(0)) {
-    step_i = (h_ij * g_j - h_jj * g_i) / determinant;
-    step_j = (h_ij * g_i - h_ii * g_j) / determinant;
-  } else {
-    if (h_ii > T(0)) step_i = -g_i / h_ii;
-    if (h_jj > T(0)) step_j = -g_j / h_jj;
-  }
-  const T i = std::clamp(T(best.i) + std::clamp(step_i, T(-1), T(1)), T(0), T(last_i));
-  const T j = std::clamp(T(best.j) + std::clamp(step_j, T(-1), T(1)), T(0), T(last_j));
-
-  const T du = i / eta_per_row_, dv = j / omega_per_col_;
+  const auto e = eta.at(u), o = omega.at(v);
+  const T x = axes_m.x * o.c, y = axes_m.y * o.s;
+  const T dx = x * e.c - m.x, dy = y * e.c - m.y, dz = axes_m.z * e.s - m.z;
+  const Vec3<T> n = normalized(gradient(e, o));
   Foot<T> foot;
-  foot.row = point.z < T(0) ? half_rows_ - du : half_rows_ + du;
-  if (point.y < T(0)) {
-    foot.col = point.x < T(0) ? dv : T(2) * quarter_cols_ - dv;
-  } else {
-    foot.col = point.x < T(0) ? T(4) * quarter_cols_ - dv : T(2) * quarter_cols_ + dv;
-    if (!(foot.col < T(4) * quarter_cols_)) foot.col = T(0);
-  }
-  const SurfaceSample<T> surface = sample(foot.row, foot.col);
   // The projection onto the normal, not the distance: a tangential error of the foot then enters only
   // squared.
-  foot.depth_m = dot(surface.normal, surface.point_m - point);
+  foot.depth_m = n.x * dx + n.y * dy + n.z * dz;
+  const T x_1 = axes_m.x * o.c_1, y_1 = axes_m.y * o.s_1, z_1 = axes_m.z * e.s_1;
+  foot.cell_m = sqrt((e.c_1 * e.c_1) * (x * x + y * y) + z_1 * z_1) * eta_per_row +
+                (e.c * sqrt(x_1 * x_1 + y_1 * y_1)) * omega_per_col;
+  const T du = u * row_per_eta, dv = v * col_per_omega;
+  foot.row = point.z < T(0) ? half_rows - du : half_rows + du;
+  const T turn = T(4) * quarter_cols, half_turn = T(2) * quarter_cols;
+  if (point.y < T(0)) {
+    foot.col = point.x < T(0) ? dv : half_turn - dv;
+  } else {
+    foot.col = point.x < T(0) ? turn - dv : half_turn + dv;
+    if (!(foot.col < turn)) foot.col = T(0);
+  }
   return foot;
 }
 
 template <class T>
 SurfaceSample<T> ShapeTable<T>::sample(T row, T col) const noexcept {
-  const T up = row - half_rows_;
-  const T eta_sign = up < T(0) ? T(-1) : T(1);
-  Curve eta = interpolate(eta_, eta_sign * up * eta_per_row_);
-  eta.s *= eta_sign;
-  eta.s_power *= eta_sign;
-  eta.c_step *= eta_sign;  // even in eta: its derivative is odd
-  eta.c_power_step *= eta_sign;
+  using std::abs;
+  const T up = row - half_rows;
+  const T z_sign = up < T(0) ? T(-1) : T(1);
+  const auto e = eta.at(abs(up) * eta_per_row);
 
-  const T turn = T(4) * quarter_cols_;
+  const T turn = T(4) * quarter_cols;
   T wrapped = col < T(0) ? col + turn : col;
-  if (!(wrapped < turn)) wrapped -= turn;
-  const int quadrant = std::clamp(static_cast<int>(wrapped / quarter_cols_), 0, 3);
-  const T along = wrapped - T(quadrant) * quarter_cols_;
-  const bool backwards = quadrant == 1 || quadrant == 3;
-  Curve omega = interpolate(omega_, (backwards ? quarter_cols_ - along : along) * omega_per_col_);
-  const T c_sign = quadrant == 0 || quadrant == 3 ? T(-1) : T(1);
-  const T s_sign = quadrant < 2 ? T(-1) : T(1);
-  const T direction = backwards ? T(-1) : T(1);
-  omega.c *= c_sign;
-  omega.s *= s_sign;
-  omega.c_power *= c_sign;
-  omega.s_power *= s_sign;
-  omega.c_step *= c_sign * direction;
-  omega.s_step *= s_sign * direction;
-  omega.c_power_step *= c_sign * direction;
-  omega.s_power_step *= s_sign * direction;
+  wrapped = wrapped < turn ? wrapped : wrapped - turn;
+  // From the half turn (omega = 0) outwards; beyond a quarter the curve is walked backwards.
+  const T around = wrapped - T(2) * quarter_cols;
+  const T y_sign = around < T(0) ? T(-1) : T(1);
+  const T along = abs(around);
+  const T x_sign = along > quarter_cols ? T(-1) : T(1);
+  const auto o = omega.at((along > quarter_cols ? T(2) * quarter_cols - along : along) * omega_per_col);
 
+  // Everything in the octant, then the signs: a coordinate carries its own, a derivative that of its
+  // direction too.
+  const T row_scale = z_sign * eta_per_row, col_scale = (x_sign * y_sign) * omega_per_col;
+  const T x = axes_m.x * o.c, y = axes_m.y * o.s;
   SurfaceSample<T> out;
-  out.point_m = {axes_m_.x * eta.c * omega.c, axes_m_.y * eta.c * omega.s, axes_m_.z * eta.s};
-  out.point_row_m = eta_per_row_ * Vec3<T>{axes_m_.x * eta.c_step * omega.c, axes_m_.y * eta.c_step * omega.s,
-                                           axes_m_.z * eta.s_step};
-  out.point_col_m =
-      omega_per_col_ * Vec3<T>{axes_m_.x * eta.c * omega.c_step, axes_m_.y * eta.c * omega.s_step, T(0)};
+  out.point_m = {x_sign * (x * e.c), y_sign * (y * e.c), z_sign * (axes_m.z * e.s)};
+  out.point_row_m = {(x_sign * row_scale) * (x * e.c_1), (y_sign * row_scale) * (y * e.c_1),
+                     (z_sign * row_scale) * (axes_m.z * e.s_1)};
+  out.point_col_m = {(x_sign * col_scale) * ((axes_m.x * o.c_1) * e.c),
+                     (y_sign * col_scale) * ((axes_m.y * o.s_1) * e.c), T(0)};
 
-  const Vec3<T> gradient{eta.c_power * omega.c_power * inverse_axes_.x,
-                         eta.c_power * omega.s_power * inverse_axes_.y, eta.s_power * inverse_axes_.z};
-  const Vec3<T> gradient_row = eta_per_row_ * Vec3<T>{eta.c_power_step * omega.c_power * inverse_axes_.x,
-                                                      eta.c_power_step * omega.s_power * inverse_axes_.y,
-                                                      eta.s_power_step * inverse_axes_.z};
-  const Vec3<T> gradient_col =
-      omega_per_col_ * Vec3<T>{eta.c_power * omega.c_power_step * inverse_axes_.x,
-                               eta.c_power * omega.s_power_step * inverse_axes_.y, T(0)};
-  const T length = norm(gradient);
+  const T w = o.c * o.s_1 - o.s * o.c_1, w_1 = o.c * o.s_2 - o.s * o.c_2;
+  const Vec3<T> g = gradient(e, o);
+  const Vec3<T> g_row{(e.s_2 * o.s_1) * inverse_axes.x, (e.s_2 * -o.c_1) * inverse_axes.y,
+                      (-e.c_2 * w) * inverse_axes.z};
+  const Vec3<T> g_col{(e.s_1 * o.s_2) * inverse_axes.x, (e.s_1 * -o.c_2) * inverse_axes.y,
+                      (-e.c_1 * w_1) * inverse_axes.z};
+  const T length = norm(g);
   const T inverse_length = length > T(0) ? T(1) / length : T(0);
-  out.normal = inverse_length * gradient;
-  out.normal_row = inverse_length * (gradient_row - dot(out.normal, gradient_row) * out.normal);
-  out.normal_col = inverse_length * (gradient_col - dot(out.normal, gradient_col) * out.normal);
+  const Vec3<T> n = inverse_length * g;
+  const Vec3<T> n_row = inverse_length * (g_row - dot(n, g_row) * n);
+  const Vec3<T> n_col = inverse_length * (g_col - dot(n, g_col) * n);
+  out.normal = {x_sign * n.x, y_sign * n.y, z_sign * n.z};
+  out.normal_row = {(x_sign * row_scale) * n_row.x, (y_sign * row_scale) * n_row.y,
+                    (z_sign * row_scale) * n_row.z};
+  out.normal_col = {(x_sign * col_scale) * n_col.x, (y_sign * col_scale) * n_col.y,
+                    (z_sign * col_scale) * n_col.z};
   return out;
 }
 

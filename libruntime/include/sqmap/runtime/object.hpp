@@ -63,6 +63,25 @@ struct Answers {
   std::span<std::uint8_t> inside{};
 };
 
+/// Instruction sets of the batched queries. All give the same bits, those of the single-point query.
+enum class SimdTarget : std::uint8_t {
+  kBaseline = 0,  ///< what the compiler was told to assume: NEON on ARM, plain C++ on x86-64
+  kSse4 = 1,
+  kAvx2 = 2,
+  kAvx512 = 3,
+};
+/// Whether this build has it and this processor runs it.
+bool is_supported(SimdTarget target) noexcept;
+/// The one in use: the widest that is supported, unless set otherwise.
+SimdTarget simd_target() noexcept;
+/// For tests and measurements; applies to the whole process. False, without effect: not supported.
+bool set_simd_target(SimdTarget target) noexcept;
+
+class PointBody;
+struct BodyPlacement;
+struct Contact;
+struct ContactQuery;
+
 /// An asset made ready for queries. Immutable, so any number of threads may query one object.
 class Object {
  public:
@@ -80,11 +99,31 @@ class Object {
   void query(std::span<const Vec3f> points_m, const Answers& answers,
              const QueryOptions& options = {}) const noexcept;
 
+  /// The points of a body in this object's frame, answers by the body's indices: as query(span) of the moved
+  /// points, but blocks that touch no part cost next to nothing. A placement that is not finite finds
+  /// nothing.
+  void query(const PointBody& body, const BodyPlacement& placement, const Answers& answers,
+             const QueryOptions& options = {}) const noexcept;
+  /// Points of the body that touch (sqmap/runtime/body.hpp), object frame; also points that are inside and
+  /// have no distance (layer 1; depth 0). Writes as many as there is room for, in an order that is the same
+  /// every time.
+  /// @return how many there are: with Seek::kAny and kDeepest at most 1
+  std::size_t contacts(const PointBody& body, const BodyPlacement& placement, std::span<Contact> contacts,
+                       const ContactQuery& query) const noexcept;
+
   std::size_t part_count() const noexcept;
   std::uint32_t level_count() const noexcept;     ///< of the part that has most
   const BoundingSphere& sphere() const noexcept;  ///< object frame
   double r_max_m() const noexcept;
-  std::size_t resident_bytes() const noexcept;  ///< memory the object holds, itself included
+  /// Memory the object holds, itself included. With n texels of b bits, c further crossings and v vertex
+  /// samples in a part, of which the baker's parts have about one a hundred texels:
+  ///
+  ///     constant + sum over parts of  record + 520 + ceil(n (b + s) / 8) + [c > 0] (ceil(n / 64) + 6 c)
+  ///                                                                      + [v > 0] (ceil(n / 64) + 8 v)
+  ///
+  /// s = 1 where any texel starts inside the mesh, else 0. The constant is below 200 bytes and the record
+  /// below 256, both fixed by the build.
+  std::size_t resident_bytes() const noexcept;
 
  private:
   struct Impl;

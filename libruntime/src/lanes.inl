@@ -1,0 +1,249 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// powers.hpp, shape_table.hpp and resident.hpp for a vector of points. Included by engine.cpp, once for each target.
+// Only operations that IEEE 754 rounds exactly, in the order of the scalar code; no fused multiply-add.
+
+const hn::ScalableTag<float> kD;
+using D = decltype(kD);
+const hn::RebindToSigned<D> kDI;
+using DI = decltype(kDI);
+const hn::RebindToUnsigned<D> kDU;
+using DU = decltype(kDU);
+using V = hn::Vec<D>;
+using VI = hn::Vec<DI>;
+using VU = hn::Vec<DU>;
+using M = hn::Mask<D>;
+
+HWY_INLINE std::uint32_t lane_count() { return static_cast<std::uint32_t>(hn::Lanes(kD)); }
+HWY_INLINE V all(float value) { return hn::Set(kD, value); }
+HWY_INLINE VI all_int(std::uint32_t value) { return hn::Set(kDI, static_cast<std::int32_t>(value)); }
+HWY_INLINE V pick(M mask, V yes, V no) { return hn::IfThenElse(mask, yes, no); }
+HWY_INLINE VI pick(M mask, VI yes, VI no) { return hn::IfThenElse(hn::RebindMask(kDI, mask), yes, no); }
+HWY_INLINE M as_float(hn::Mask<DI> mask) { return hn::RebindMask(kD, mask); }
+HWY_INLINE bool none(M mask) { return hn::AllFalse(kD, mask); }
+HWY_INLINE V to_float(VI value) { return hn::ConvertTo(kD, value); }
+HWY_INLINE VI to_int(V value) { return hn::ConvertTo(kDI, value); }
+// lesser() and greater() of shape_table.hpp.
+HWY_INLINE V least(V a, V b) { return hn::IfThenElse(hn::Lt(a, b), a, b); }
+HWY_INLINE V most(V a, V b) { return hn::IfThenElse(hn::Gt(a, b), a, b); }
+HWY_INLINE V limited(V value, V low, V high) { return least(most(value, low), high); }
+
+struct V3 {
+  V x, y, z;
+};
+HWY_INLINE V3 operator+(const V3& a, const V3& b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
+HWY_INLINE V3 operator-(const V3& a, const V3& b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
+HWY_INLINE V3 operator*(V s, const V3& a) { return {s * a.x, s * a.y, s * a.z}; }
+HWY_INLINE V dot3(const V3& a, const V3& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
+HWY_INLINE V3 cross3(const V3& a, const V3& b) {
+  return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
+}
+HWY_INLINE V3 pick(M mask, const V3& yes, const V3& no) {
+  return {pick(mask, yes.x, no.x), pick(mask, yes.y, no.y), pick(mask, yes.z, no.z)};
+}
+HWY_INLINE V3 all(const Vec3f& a) { return {all(a.x), all(a.y), all(a.z)}; }
+/// 1/|a|, or 0 where |a| is zero.
+HWY_INLINE V inverse_length(const V3& a) {
+  const V length = hn::Sqrt(dot3(a, a));
+  return hn::IfThenElseZero(hn::Gt(length, hn::Zero(kD)), all(1.0F) / length);
+}
+HWY_INLINE V3 normalized3(const V3& a) { return inverse_length(a) * a; }
+HWY_INLINE V3 rotated(const Rotation<float>& r, const V3& v) {
+  return {dot3(all(r.row[0]), v), dot3(all(r.row[1]), v), dot3(all(r.row[2]), v)};
+}
+HWY_INLINE V3 rotated_back(const Rotation<float>& r, const V3& v) {
+  return v.x * all(r.row[0]) + v.y * all(r.row[1]) + v.z * all(r.row[2]);
+}
+
+SQMAP_KERNEL V log2_of(V x) {
+  const VI bits = hn::BitCast(kDI, most(x, all(kLeastNormal)));
+  const VI exponent = hn::ShiftRight<23>(bits - hn::Set(kDI, kHalfRootBits));
+  const V m = hn::BitCast(kD, bits - hn::ShiftLeft<23>(exponent));
+  const V s = (m - all(1.0F)) / (m + all(1.0F)), q = s * s;
+  V series = all(kLog2Series[4]);
+  for (int k = 3; k >= 0; --k) series = all(kLog2Series[k]) + q * series;
+  return to_float(exponent) + s * series;
+}
+SQMAP_KERNEL V exp2_of(V x) {
+  const V inner = limited(x, all(-126.0F), all(126.0F));
+  const V shifted = inner + all(kRounder);
+  const V f = inner - (shifted - all(kRounder));
+  const VI n = hn::BitCast(kDI, shifted) - hn::BitCast(kDI, all(kRounder));
+  V series = all(kExp2Series[7]);
+  for (int k = 6; k >= 0; --k) series = all(kExp2Series[k]) + f * series;
+  return hn::BitCast(kD, hn::BitCast(kDI, series) + hn::ShiftLeft<23>(n));
+}
+HWY_INLINE V power_of(V x, float k) { return exp2_of(all(k) * log2_of(x)); }
+
+/// table[k] for k in [0, 31].
+HWY_INLINE V lookup(const float* table, VI k) {
+  static_assert(CurveTable<float>::kCells == 32);
+#if HWY_TARGET == HWY_AVX3
+  return V{_mm512_permutex2var_ps(_mm512_loadu_ps(table), k.raw, _mm512_loadu_ps(table + 16))};
+#else
+  return hn::GatherIndex(kD, table, k);
+#endif
+}
+/// Four bytes from base + offset, wherever they begin.
+HWY_INLINE VU gather_bytes(const std::uint8_t* base, VI offset) {
+#if HWY_TARGET == HWY_AVX3 || HWY_TARGET == HWY_AVX2
+  return hn::BitCast(kDU, hn::GatherOffset(kDI, reinterpret_cast<const std::int32_t*>(base), offset));
+#else
+  HWY_ALIGN std::int32_t offsets[kMostLanes];
+  HWY_ALIGN std::uint32_t values[kMostLanes];
+  hn::Store(offset, kDI, offsets);
+  for (std::uint32_t lane = 0; lane < lane_count(); ++lane) std::memcpy(&values[lane], base + offsets[lane], 4);
+  return hn::Load(kDU, values);
+#endif
+}
+
+struct Place {
+  V c, s, c_1, s_1, c_2, s_2;
+};
+HWY_INLINE void hermite(const float* table, const float* steps, VI k, V t, V& value, V& first, V& second) {
+  const V a = lookup(table, k), a_step = lookup(steps, k), b_step = lookup(steps + 1, k);
+  const V rise = lookup(table + 1, k) - a;
+  const V cubic = (a_step + b_step) - (rise + rise);
+  const V square = (rise - a_step) - cubic;
+  value = a + t * (a_step + t * (square + t * cubic));
+  first = a_step + t * ((square + square) + t * (all(3.0F) * cubic));
+  second = (square + square) + t * (all(6.0F) * cubic);
+}
+SQMAP_KERNEL Place place_at(const CurveTable<float>& curve, V position) {
+  const VI k = hn::Min(hn::Max(to_int(position), hn::Zero(kDI)), hn::Set(kDI, CurveTable<float>::kCells - 1));
+  const V t = position - to_float(k);
+  Place place;
+  hermite(curve.c, curve.c_step, k, t, place.c, place.c_1, place.c_2);
+  hermite(curve.s, curve.s_step, k, t, place.s, place.s_1, place.s_2);
+  return place;
+}
+HWY_INLINE V3 gradient(const ShapeTable<float>& table, const Place& e, const Place& o) {
+  const V w = o.c * o.s_1 - o.s * o.c_1;
+  return {(e.s_1 * o.s_1) * all(table.inverse_axes.x), (e.s_1 * hn::Neg(o.c_1)) * all(table.inverse_axes.y),
+          (hn::Neg(e.c_1) * w) * all(table.inverse_axes.z)};
+}
+
+struct VFoot {
+  V row, col, depth, cell;
+};
+
+SQMAP_KERNEL void newton_step(const ShapeTable<float>& table, const V3& m, V& u, V& v) {
+  using Table = ShapeTable<float>;
+  const Place e = place_at(table.eta, u), o = place_at(table.omega, v);
+  const V ax = all(table.axes_m.x), ay = all(table.axes_m.y), az = all(table.axes_m.z);
+  const V x = ax * o.c, y = ay * o.s, x_1 = ax * o.c_1, y_1 = ay * o.s_1, x_2 = ax * o.c_2, y_2 = ay * o.s_2;
+  const V z_1 = az * e.s_1, z_2 = az * e.s_2;
+  const V dx = x * e.c - m.x, dy = y * e.c - m.y, dz = az * e.s - m.z;
+  const V along = dx * x + dy * y, along_1 = dx * x_1 + dy * y_1, along_2 = dx * x_2 + dy * y_2;
+  const V g_u = e.c_1 * along + dz * z_1;
+  const V g_v = e.c * along_1;
+  const V t_uu = (e.c_1 * e.c_1) * (x * x + y * y) + z_1 * z_1;
+  const V t_vv = (e.c * e.c) * (x_1 * x_1 + y_1 * y_1);
+  const V floor = all(Table::kLeastCurvature);
+  const V h_uu = most(t_uu + (e.c_2 * along + dz * z_2), floor * t_uu);
+  const V raw_vv = most(t_vv + e.c * along_2, floor * t_vv);
+  const V h_vv = pick(hn::Gt(raw_vv, hn::Zero(kD)), raw_vv, all(1.0F));
+  const V h_uv = e.c_1 * (e.c * (x * x_1 + y * y_1) + along_1);
+  const V product = h_uu * h_vv;
+  const V determinant = product - h_uv * h_uv;
+  const M regular = hn::Gt(determinant, all(Table::kLeastDeterminant) * product);
+  const V coupling = hn::IfThenElseZero(regular, h_uv);
+  const V inverse = all(1.0F) / pick(regular, determinant, product);
+  const V du = (coupling * g_v - h_vv * g_u) * inverse;
+  const V dv = (coupling * g_u - h_uu * g_v) * inverse;
+  const V step = all(Table::kMostStep), back = all(-Table::kMostStep), end = all(float{Table::kCells});
+  u = limited(u + limited(du, back, step), hn::Zero(kD), end);
+  v = limited(v + limited(dv, back, step), hn::Zero(kD), end);
+}
+
+/// ShapeTable::foot.
+SQMAP_KERNEL VFoot foot_of(const ShapeTable<float>& table, const V3& point) {
+  using Table = ShapeTable<float>;
+  const V3 m{hn::Abs(point.x), hn::Abs(point.y), hn::Abs(point.z)};
+  V along[Table::kScan];
+  for (int j = 0; j < Table::kScan; ++j) {
+    along[j] = all(table.scan.x_m[j]) * m.x + all(table.scan.y_m[j]) * m.y;
+  }
+  V u = hn::Zero(kD), v = hn::Zero(kD), greatest = all(-std::numeric_limits<float>::infinity());
+  for (int i = 0; i < Table::kScan; ++i) {
+    V row_most = along[0] - all(table.scan.half_square_m2[i][0]);
+    V row_v = all(static_cast<float>(Table::scan_node(0)));
+    for (int j = 1; j < Table::kScan; ++j) {
+      const V here = along[j] - all(table.scan.half_square_m2[i][j]);
+      row_v = pick(hn::Gt(here, row_most), all(static_cast<float>(Table::scan_node(j))), row_v);
+      row_most = most(here, row_most);
+    }
+    const V here = all(table.scan.c[i]) * row_most +
+                   (all(table.scan.z_m[i]) * m.z - all(table.scan.half_z_square_m2[i]));
+    const M better = hn::Gt(here, greatest);
+    u = pick(better, all(static_cast<float>(Table::scan_node(i))), u);
+    v = pick(better, row_v, v);
+    greatest = most(here, greatest);
+  }
+  for (int step = 0; step < Table::kNewtonSteps; ++step) newton_step(table, m, u, v);
+
+  const Place e = place_at(table.eta, u), o = place_at(table.omega, v);
+  const V ax = all(table.axes_m.x), ay = all(table.axes_m.y), az = all(table.axes_m.z);
+  const V x = ax * o.c, y = ay * o.s;
+  const V dx = x * e.c - m.x, dy = y * e.c - m.y, dz = az * e.s - m.z;
+  const V3 n = normalized3(gradient(table, e, o));
+  VFoot foot;
+  foot.depth = n.x * dx + n.y * dy + n.z * dz;
+  const V x_1 = ax * o.c_1, y_1 = ay * o.s_1, z_1 = az * e.s_1;
+  foot.cell = hn::Sqrt((e.c_1 * e.c_1) * (x * x + y * y) + z_1 * z_1) * all(table.eta_per_row) +
+              (e.c * hn::Sqrt(x_1 * x_1 + y_1 * y_1)) * all(table.omega_per_col);
+  const V du = u * all(table.row_per_eta), dv = v * all(table.col_per_omega);
+  const V zero = hn::Zero(kD), half_rows = all(table.half_rows);
+  foot.row = pick(hn::Lt(point.z, zero), half_rows - du, half_rows + du);
+  const V turn = all(4.0F * table.quarter_cols), half_turn = all(2.0F * table.quarter_cols);
+  const M left = hn::Lt(point.x, zero);
+  const V before = pick(left, dv, half_turn - dv);
+  const V after = pick(left, turn - dv, half_turn + dv);
+  foot.col = pick(hn::Lt(point.y, zero), before, hn::IfThenElseZero(hn::Lt(after, turn), after));
+  return foot;
+}
+
+struct Sample {
+  V3 point, normal, point_row, point_col, normal_row, normal_col;
+};
+
+/// ShapeTable::sample.
+SQMAP_KERNEL Sample sample_at(const ShapeTable<float>& table, V row, V col) {
+  const V zero = hn::Zero(kD), one = all(1.0F), minus = all(-1.0F);
+  const V up = row - all(table.half_rows);
+  const V z_sign = pick(hn::Lt(up, zero), minus, one);
+  const Place e = place_at(table.eta, hn::Abs(up) * all(table.eta_per_row));
+
+  const V turn = all(4.0F * table.quarter_cols), half_turn = all(2.0F * table.quarter_cols);
+  const V raised = pick(hn::Lt(col, zero), col + turn, col);
+  const V wrapped = pick(hn::Lt(raised, turn), raised, raised - turn);
+  const V around = wrapped - half_turn;
+  const V y_sign = pick(hn::Lt(around, zero), minus, one);
+  const V along = hn::Abs(around);
+  const M beyond = hn::Gt(along, all(table.quarter_cols));
+  const V x_sign = pick(beyond, minus, one);
+  const Place o = place_at(table.omega, pick(beyond, half_turn - along, along) * all(table.omega_per_col));
+
+  const V row_scale = z_sign * all(table.eta_per_row), col_scale = (x_sign * y_sign) * all(table.omega_per_col);
+  const V ax = all(table.axes_m.x), ay = all(table.axes_m.y), az = all(table.axes_m.z);
+  const V x = ax * o.c, y = ay * o.s;
+  Sample out;
+  out.point = {x_sign * (x * e.c), y_sign * (y * e.c), z_sign * (az * e.s)};
+  out.point_row = {(x_sign * row_scale) * (x * e.c_1), (y_sign * row_scale) * (y * e.c_1),
+                   (z_sign * row_scale) * (az * e.s_1)};
+  out.point_col = {(x_sign * col_scale) * ((ax * o.c_1) * e.c), (y_sign * col_scale) * ((ay * o.s_1) * e.c), zero};
+
+  const V w = o.c * o.s_1 - o.s * o.c_1, w_1 = o.c * o.s_2 - o.s * o.c_2;
+  const V bx = all(table.inverse_axes.x), by = all(table.inverse_axes.y), bz = all(table.inverse_axes.z);
+  const V3 g = gradient(table, e, o);
+  const V3 g_row{(e.s_2 * o.s_1) * bx, (e.s_2 * hn::Neg(o.c_1)) * by, (hn::Neg(e.c_2) * w) * bz};
+  const V3 g_col{(e.s_1 * o.s_2) * bx, (e.s_1 * hn::Neg(o.c_2)) * by, (hn::Neg(e.c_1) * w_1) * bz};
+  const V inverse = inverse_length(g);
+  const V3 n = inverse * g;
+  const V3 n_row = inverse * (g_row - dot3(n, g_row) * n);
+  const V3 n_col = inverse * (g_col - dot3(n, g_col) * n);
+  out.normal = {x_sign * n.x, y_sign * n.y, z_sign * n.z};
+  out.normal_row = {(x_sign * row_scale) * n_row.x, (y_sign * row_scale) * n_row.y, (z_sign * row_scale) * n_row.z};
+  out.normal_col = {(x_sign * col_scale) * n_col.x, (y_sign * col_scale) * n_col.y, (z_sign * col_scale) * n_col.z};
+  return out;
+}

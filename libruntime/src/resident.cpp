@@ -1,0 +1,249 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "resident.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <type_traits>
+#include <vector>
+
+namespace sqmap::runtime {
+
+namespace {
+
+constexpr int kCells = CurveTable<float>::kCells;
+constexpr std::uint32_t kTail = 4;  // a texel is read as four bytes, wherever it begins
+
+/// Bytes appended one object after another; its first pass only counts.
+class Layout {
+ public:
+  explicit Layout(std::uint8_t* out) : out_(out) {}
+  /// Offset of the next byte. Wraps only where size() shows that nothing will be kept.
+  std::uint32_t at() const noexcept { return static_cast<std::uint32_t>(size_); }
+  std::size_t size() const noexcept { return size_; }
+  void put(const void* data, std::size_t size) {
+    if (out_ != nullptr) std::memcpy(out_ + size_, data, size);
+    size_ += size;
+  }
+  template <class T>
+  void put(T value) {
+    put(&value, sizeof value);
+  }
+
+ private:
+  std::uint8_t* out_;
+  std::size_t size_ = 0;
+};
+
+/// Appends values of a fixed number of bits, least significant first.
+class BitPacker {
+ public:
+  explicit BitPacker(Layout& out) : out_(out) {}
+  void put(std::uint32_t value, unsigned bits) {
+    pending_ |= std::uint64_t{value} << count_;
+    for (count_ += bits; count_ >= 8; count_ -= 8, pending_ >>= 8)
+      out_.put(static_cast<std::uint8_t>(pending_));
+  }
+  void flush() {
+    if (count_ > 0) out_.put(static_cast<std::uint8_t>(pending_));
+    count_ = 0;
+  }
+
+ private:
+  Layout& out_;
+  std::uint64_t pending_ = 0;
+  unsigned count_ = 0;
+};
+
+template <class Entry, class Key, class Value>
+SideList put_list(Layout& out, std::vector<Entry> entries, std::size_t texels, Key key, Value value) {
+  // The quick validation does not look at the entries; what names no texel can never be asked for.
+  std::erase_if(entries, [&](const Entry& entry) { return key(entry) >= texels; });
+  SideList list;
+  list.count = static_cast<std::uint32_t>(entries.size());
+  if (entries.empty()) return list;
+  std::vector<std::uint8_t> blocks((texels + 8 * Resident::kBlock - 1) / (8 * Resident::kBlock));
+  for (const Entry& entry : entries) {
+    const std::uint32_t block = key(entry) / Resident::kBlock;
+    blocks[block / 8] = static_cast<std::uint8_t>(blocks[block / 8] | (1U << (block % 8)));
+  }
+  list.blocks_at = out.at();
+  out.put(blocks.data(), blocks.size());
+  list.keys_at = out.at();
+  for (const Entry& entry : entries) out.put<std::uint32_t>(key(entry));
+  list.values_at = out.at();
+  for (const Entry& entry : entries) value(entry);
+  return list;
+}
+
+constexpr double kMostPacked = 65535;
+
+std::uint16_t packed(double value, double unit) {
+  return static_cast<std::uint16_t>(std::clamp(std::round(value / unit), 0.0, kMostPacked));
+}
+
+float unit_for(double most) { return rounded_up(most / kMostPacked); }
+
+struct PackedCurve {
+  std::uint16_t c_fall[kCells], s_rise[kCells], c_step[kCells + 1], s_step[kCells + 1];
+};
+
+/// Differences of `sums`, which ascend from 0, rounded so that their own sums stay within half a unit.
+void pack_differences(const double* sums, double unit, std::uint16_t* out) {
+  double packed_sum = 0;
+  for (int k = 0; k < kCells; ++k) {
+    out[k] = packed(sums[k + 1] - packed_sum, unit);
+    packed_sum += out[k] * unit;
+  }
+}
+
+CurveUnits put_curve(Layout& out, const CurveTable<double>& curve) {
+  double c_fallen[kCells + 1], c_fall = 0, s_rise = 0, c_step = 0, s_step = 0;
+  for (int k = 0; k <= kCells; ++k) {
+    c_fallen[kCells - k] = curve.c[k];  // from the end, where c is exactly 0
+    c_step = std::max(c_step, -curve.c_step[k]);
+    s_step = std::max(s_step, curve.s_step[k]);
+    if (k == 0) continue;
+    c_fall = std::max(c_fall, curve.c[k - 1] - curve.c[k]);
+    s_rise = std::max(s_rise, curve.s[k] - curve.s[k - 1]);
+  }
+  const CurveUnits units{unit_for(c_fall), unit_for(s_rise), unit_for(c_step), unit_for(s_step)};
+  PackedCurve result;
+  pack_differences(c_fallen, double{units.c}, result.c_fall);
+  pack_differences(curve.s, double{units.s}, result.s_rise);
+  for (int k = 0; k <= kCells; ++k) {
+    result.c_step[k] = packed(-curve.c_step[k], double{units.c_step});
+    result.s_step[k] = packed(curve.s_step[k], double{units.s_step});
+  }
+  out.put(result);
+  return units;
+}
+
+void unpack_curve(const PackedCurve& curve, const CurveUnits& units, CurveTable<float>& out) noexcept {
+  // Sums first, then loops that the compiler turns into vectors.
+  std::int32_t c[kCells + 1], s[kCells + 1];
+  c[kCells] = s[0] = 0;
+  for (int k = 0; k < kCells; ++k) {
+    c[kCells - 1 - k] = c[kCells - k] + curve.c_fall[k];
+    s[k + 1] = s[k] + curve.s_rise[k];
+  }
+  for (int k = 0; k <= kCells; ++k) out.c[k] = units.c * static_cast<float>(c[k]);
+  for (int k = 0; k <= kCells; ++k) out.s[k] = units.s * static_cast<float>(s[k]);
+  for (int k = 0; k <= kCells; ++k) {
+    out.c_step[k] = -units.c_step * static_cast<float>(std::int32_t{curve.c_step[k]});
+  }
+  for (int k = 0; k <= kCells; ++k) {
+    out.s_step[k] = units.s_step * static_cast<float>(std::int32_t{curve.s_step[k]});
+  }
+}
+
+PartRecord put_part(Layout& out, const Part& part, double units_per_m) {
+  const DistanceMap& map = part.map;
+  PartRecord record;
+  record.semi_axes = cast<float>(units_per_m * part.shape.semi_axes_m);
+  record.inverse_axes = {1 / record.semi_axes.x, 1 / record.semi_axes.y, 1 / record.semi_axes.z};
+  record.power_1 = static_cast<float>(2 / part.shape.e1);
+  record.power_2 = static_cast<float>(2 / part.shape.e2);
+  record.power_ratio = static_cast<float>(part.shape.e2 / part.shape.e1);
+  record.object_from_part = rotation<float>(part.object_from_part.orientation);
+  record.translation = cast<float>(units_per_m * part.object_from_part.translation_m);
+  record.sphere_centre = cast<float>(units_per_m * part.sphere.centre_m);
+  record.sphere_radius = rounded_up(units_per_m * part.sphere.radius_m);
+  record.sphere_square = record.sphere_radius * record.sphere_radius;
+  record.depth_min = static_cast<float>(units_per_m * map.depth_min_m);
+  record.depth_step = static_cast<float>(units_per_m * map.depth_step_m);
+  record.rows = map.rows;
+  record.cols = map.cols;
+  record.vertex_count = part.vertex_count;
+  record.miss_code = map.miss_code();
+  record.level_count = static_cast<std::uint8_t>(map.level_count);
+  record.code_bits = static_cast<std::uint8_t>(map.bits);
+  const bool has_seam = std::any_of(map.start_inside.begin(), map.start_inside.end(),
+                                    [](std::uint8_t bits) { return bits != 0; });
+  record.texel_bits = static_cast<std::uint8_t>(map.bits + (has_seam ? 1 : 0));
+
+  record.curves_at = out.at();
+  const Vec3d& a = part.shape.semi_axes_m;
+  record.eta_units = put_curve(out, CurveTable<double>::of(std::sqrt(a.x * a.y), a.z, part.shape.e1));
+  record.omega_units = put_curve(out, CurveTable<double>::of(a.x, a.y, part.shape.e2));
+
+  record.texels_at = out.at();
+  BitPacker packer(out);
+  for (std::uint32_t k = 0; k < map.code.size(); ++k) {
+    packer.put((map.code[k] & map.miss_code()) | (map.starts_inside(k) ? 1U << map.bits : 0U),
+               record.texel_bits);
+  }
+  packer.flush();
+
+  record.sheets = put_list(
+      out, map.crossings, map.code.size(), [](const DistanceMap::Crossing& c) { return c.texel; },
+      [&](const DistanceMap::Crossing& c) { out.put(c.code); });
+  record.fans = put_list(
+      out, map.vertex_samples, map.code.size(), [](const DistanceMap::VertexSample& s) { return s.cell; },
+      [&](const DistanceMap::VertexSample& s) {
+        out.put(s.row_256ths);
+        out.put(s.col_256ths);
+        out.put(s.code);
+      });
+  return record;
+}
+
+}  // namespace
+
+float rounded_up(double value) noexcept {
+  const float rounded = static_cast<float>(value);
+  return rounded < value ? std::nextafter(rounded, std::numeric_limits<float>::infinity()) : rounded;
+}
+
+Resident::Resident(const Asset& asset) : part_count_(static_cast<std::uint32_t>(asset.parts.size())) {
+  static_assert(std::is_trivially_copyable_v<PartRecord>);
+  int exponent = 0;
+  std::frexp(asset.sphere.radius_m, &exponent);
+  unit_m_ = std::ldexp(1.0F, std::clamp(exponent, -126, 126));
+  const double units_per_m = 1 / double{unit_m_};
+  sphere_centre_ = cast<float>(units_per_m * asset.sphere.centre_m);
+  sphere_radius_ = rounded_up(units_per_m * asset.sphere.radius_m);
+  const std::vector<PartRecord> blank(part_count_);
+  const auto lay_out = [&](Layout& out) {
+    out.put(blank.data(), blank.size() * sizeof(PartRecord));
+    for (std::uint32_t k = 0; k < part_count_; ++k) {
+      const PartRecord record = put_part(out, asset.parts[k], units_per_m);
+      if (bytes_) std::memcpy(bytes_.get() + k * sizeof(PartRecord), &record, sizeof record);
+    }
+    out.put(std::uint32_t{0});
+    static_assert(kTail == sizeof(std::uint32_t));
+  };
+  Layout count(nullptr);
+  lay_out(count);
+  if (count.size() > std::numeric_limits<std::uint32_t>::max()) return;
+  size_ = count.size();
+  bytes_ = std::make_unique<std::uint8_t[]>(size_);
+  Layout out(bytes_.get());
+  lay_out(out);
+}
+
+std::uint32_t Resident::find(const SideList& list, std::uint32_t key_wanted) const noexcept {
+  if (list.count == 0) return 0;
+  const std::uint32_t block = key_wanted / kBlock;
+  if (((bytes_[list.blocks_at + block / 8] >> (block % 8)) & 1U) == 0) return list.count;
+  std::uint32_t low = 0, high = list.count;
+  while (low < high) {
+    const std::uint32_t middle = low + (high - low) / 2;
+    if (key(list, middle) < key_wanted) {
+      low = middle + 1;
+    } else {
+      high = middle;
+    }
+  }
+  return low;
+}
+
+void Resident::unpack(const PartRecord& part, ShapeTable<float>& table) const noexcept {
+  PackedCurve curves[2];
+  std::memcpy(curves, bytes_.get() + part.curves_at, sizeof curves);
+  unpack_curve(curves[0], part.eta_units, table.eta);
+  unpack_curve(curves[1], part.omega_units, table.omega);
+  table.prepare(part.semi_axes, part.rows, part.cols);
+}
+
+}  // namespace sqmap::runtime

@@ -1,0 +1,135 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// An asset as it lies in memory for queries. Lengths in it are in units of unit_m, a power of two near the
+// object's radius: products of four lengths then neither overflow nor vanish, and changing units rounds
+// nothing. One allocation of
+//
+//     PartRecord[parts] | part 0: curves | texels | sheet blocks | sheets | fan blocks | fans | part 1: ... |
+//     4 bytes
+//
+//     curves   eta and omega as CurveTable, 16 bits a number: how far c falls and s rises over each cell
+//     (their sums
+//              then err by half a unit, and differences of neighbours, which make the second derivatives,
+//              hardly more), and the steps at the nodes
+//     texels   one a node, row-major, `texel_bits` each, least significant bit first: the depth code and,
+//     where
+//              the part has a seam, above it the bit that the node starts inside the mesh
+//     sheets   second and later crossings: texel numbers of 32 bits, ascending, then codes of 16 bits
+//     fans     vertex samples: cells of 32 bits, ascending, then places (row, col of 8 bits), then codes
+//     blocks   one bit for each kBlock texels: a list holds one of them. Absent where the list is empty.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <memory>
+
+#include "sqmap/asset/asset.hpp"
+#include "sqmap/asset/shape_table.hpp"
+
+namespace sqmap::runtime {
+
+/// A sorted side list of a map.
+struct SideList {
+  std::uint32_t blocks_at{}, keys_at{}, values_at{};  ///< byte offsets; values are `value_words` x 16 bits
+  std::uint32_t count{};
+};
+
+/// What one unit of the packed numbers of a curve stands for.
+struct CurveUnits {
+  float c{}, s{}, c_step{}, s_step{};
+};
+
+/// One part. Lengths in units of Resident::unit_m; byte offsets count from the start of the allocation.
+struct PartRecord {
+  Vec3f semi_axes, inverse_axes;
+  float power_1{}, power_2{}, power_ratio{};  ///< 2/e1, 2/e2, e2/e1
+  Rotation<float> object_from_part;
+  Vec3f translation;
+  Vec3f sphere_centre;  ///< object frame
+  float sphere_radius{}, sphere_square{};
+  float depth_min{}, depth_step{};
+  CurveUnits eta_units, omega_units;
+  std::uint32_t rows{}, cols{}, vertex_count{};
+  std::uint16_t miss_code{};
+  std::uint8_t level_count{}, code_bits{}, texel_bits{};
+  std::uint32_t curves_at{}, texels_at{};
+  SideList sheets, fans;
+
+  Vec3f to_part(const Vec3f& p) const noexcept { return object_from_part.apply_inverse(p - translation); }
+  Vec3f to_object(const Vec3f& p_part) const noexcept { return object_from_part.apply(p_part) + translation; }
+  float depth_of(std::uint32_t code) const noexcept {
+    return depth_min + static_cast<float>(code) * depth_step;
+  }
+  std::uint32_t stride_at(std::uint32_t level) const noexcept {
+    return 1U << (level < level_count ? level : level_count - 1U);
+  }
+  double texels_at_level(std::uint32_t level) const noexcept {
+    const std::uint32_t stride = stride_at(level);
+    return (static_cast<double>((rows - 1) / stride) + 1) * (cols / stride);
+  }
+};
+
+class Resident {
+ public:
+  static constexpr std::uint32_t kBlock = 8;  ///< texels a bit of a side list's blocks
+
+  /// Precondition: a valid asset. fits() tells whether it could be held; if not, nothing is.
+  explicit Resident(const Asset& asset);
+  bool fits() const noexcept { return bytes_ != nullptr; }
+
+  float unit_m() const noexcept { return unit_m_; }
+  float units_per_m() const noexcept { return 1 / unit_m_; }
+  const Vec3f& sphere_centre() const noexcept { return sphere_centre_; }  ///< of the object, in units
+  float sphere_square() const noexcept { return sphere_radius_ * sphere_radius_; }
+  float sphere_radius() const noexcept { return sphere_radius_; }
+  std::uint32_t part_count() const noexcept { return part_count_; }
+  const PartRecord& part(std::uint32_t index) const noexcept { return parts()[index]; }
+  const PartRecord* parts() const noexcept { return reinterpret_cast<const PartRecord*>(bytes_.get()); }
+  const std::uint8_t* bytes() const noexcept { return bytes_.get(); }
+  std::size_t size() const noexcept { return size_; }
+
+  /// The depth code and start bit of a texel.
+  std::uint32_t texel(const PartRecord& part, std::uint32_t index) const noexcept {
+    const std::uint32_t bit = index * part.texel_bits;
+    return (load<std::uint32_t>(part.texels_at + bit / 8) >> (bit % 8)) & ((1U << part.texel_bits) - 1U);
+  }
+  /// Position of the first entry of a list with key >= `key`, or `count`, without a search where its block is
+  /// empty.
+  std::uint32_t find(const SideList& list, std::uint32_t key) const noexcept;
+  std::uint32_t key(const SideList& list, std::uint32_t position) const noexcept {
+    return load<std::uint32_t>(list.keys_at + 4 * position);
+  }
+  std::uint16_t sheet_code(const PartRecord& part, std::uint32_t position) const noexcept {
+    return load<std::uint16_t>(part.sheets.values_at + 2 * position);
+  }
+  /// Low byte: row, high byte: column, in 1/256 of a cell.
+  std::uint16_t fan_place(const PartRecord& part, std::uint32_t position) const noexcept {
+    return load<std::uint16_t>(part.fans.values_at + 4 * position);
+  }
+  std::uint16_t fan_code(const PartRecord& part, std::uint32_t position) const noexcept {
+    return load<std::uint16_t>(part.fans.values_at + 4 * position + 2);
+  }
+  /// The part's curves, unpacked.
+  void unpack(const PartRecord& part, ShapeTable<float>& table) const noexcept;
+
+ private:
+  template <class T>
+  T load(std::uint32_t at) const noexcept {
+    T value;
+    std::memcpy(&value, bytes_.get() + at, sizeof value);
+    return value;
+  }
+
+  std::unique_ptr<std::uint8_t[]> bytes_;
+  std::size_t size_{};
+  std::uint32_t part_count_{};
+  float unit_m_{1};
+  Vec3f sphere_centre_;
+  float sphere_radius_{};
+};
+
+/// The next float at or above a double.
+float rounded_up(double value) noexcept;
+
+}  // namespace sqmap::runtime

@@ -1,0 +1,316 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <bit>
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <random>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "sqmap/asset/shape_table.hpp"
+#include "sqmap/runtime/object.hpp"
+
+#include "chart.hpp"
+#include "resident.hpp"
+#include "support/mixed_asset.hpp"
+
+namespace sqmap::runtime {
+namespace {
+
+constexpr SimdTarget kTargets[] = {SimdTarget::kBaseline, SimdTarget::kSse4, SimdTarget::kAvx2,
+                                   SimdTarget::kAvx512};
+
+Object built(const Asset& asset) {
+  auto object = Object::build(asset);
+  EXPECT_TRUE(object.ok()) << (object ? "" : object.error().finding);
+  return std::move(object).value();
+}
+
+/// Equal to the last bit but for the sign of zero; any NaN equals any.
+bool same(float a, float b) { return a == b || (std::isnan(a) && std::isnan(b)); }
+
+struct Batch {
+  explicit Batch(std::size_t count)
+      : distance_m(count, 77), normal(count), surface_m(count), part(count), layer(count), inside(count) {}
+  Answers answers() { return {distance_m, normal, surface_m, part, layer, inside}; }
+  bool holds(std::size_t i, const Answer& one) const {
+    return same(distance_m[i], one.signed_distance_m) && normal[i] == one.normal &&
+           surface_m[i] == one.surface_m && part[i] == one.part &&
+           layer[i] == static_cast<std::uint8_t>(one.layer) && (inside[i] != 0) == one.inside;
+  }
+  std::vector<float> distance_m;
+  std::vector<Vec3f> normal, surface_m;
+  std::vector<std::uint32_t> part;
+  std::vector<std::uint8_t> layer, inside;
+};
+
+class EveryTarget : public testing::TestWithParam<SimdTarget> {
+ protected:
+  void SetUp() override {
+    before_ = simd_target();
+    if (!set_simd_target(GetParam())) GTEST_SKIP() << "this processor has no such instructions";
+    EXPECT_EQ(simd_target(), GetParam());
+  }
+  void TearDown() override { set_simd_target(before_); }
+
+ private:
+  SimdTarget before_{};
+};
+std::string target_name(const testing::TestParamInfo<SimdTarget>& target) {
+  constexpr const char* kNames[] = {"Baseline", "Sse4", "Avx2", "Avx512"};
+  return kNames[static_cast<std::size_t>(target.param)];
+}
+INSTANTIATE_TEST_SUITE_P(Engine, EveryTarget, testing::ValuesIn(kTargets), target_name);
+
+TEST_P(EveryTarget, AnswersLikeTheSinglePointToTheLastBit) {
+  const Asset asset = test::mixed_asset();
+  const Object object = built(asset);
+  const std::vector<Vec3f> points = test::points_around(asset, 3000, 21);
+  Batch batch(points.size());
+  for (const Layer layer : {Layer::kOne, Layer::kTwo, Layer::kThree, Layer::kAuto}) {
+    for (const std::uint32_t level : {0U, 1U, 7U}) {
+      for (const float edge_m : {0.0F, 0.2F}) {
+        const QueryOptions options{layer, level, edge_m};
+        object.query(points, batch.answers(), options);
+        int differing = 0, inside = 0, known = 0, nowhere = 0;
+        for (std::size_t i = 0; i < points.size(); ++i) {
+          const Answer one = object.query(points[i], options);
+          differing += !batch.holds(i, one);
+          inside += one.inside;
+          known += !std::isnan(one.signed_distance_m);
+          nowhere += one.part == kNowhere;
+        }
+        EXPECT_EQ(differing, 0) << "layer " << int(layer) << ", level " << level << ", edge " << edge_m;
+        EXPECT_GT(inside, 500);
+        EXPECT_GT(nowhere, 100);
+        EXPECT_EQ(known > 1000, layer != Layer::kOne) << known;
+      }
+    }
+  }
+}
+
+TEST_P(EveryTarget, AnswersBatchesOfAnyLengthAndWritesNothingBeyond) {
+  const Asset asset = test::mixed_asset();
+  const Object object = built(asset);
+  const std::vector<Vec3f> points = test::points_around(asset, 1100, 22);
+  for (const std::size_t count : {0U, 1U, 3U, 15U, 16U, 17U, 511U, 512U, 513U, 1100U}) {
+    Batch batch(points.size());
+    Answers answers = batch.answers();
+    answers.signed_distance_m = answers.signed_distance_m.first(count);
+    answers.normal = answers.surface_m = {};
+    answers.part = {};
+    answers.layer = answers.inside = {};
+    object.query(std::span(points).first(count), answers);
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      const float expected = i < count ? object.query(points[i]).signed_distance_m : 77;
+      ASSERT_TRUE(same(batch.distance_m[i], expected)) << i << " of " << count;
+    }
+  }
+}
+
+TEST_P(EveryTarget, FindsNothingForPointsThatAreNotFiniteAndLeavesTheirNeighboursAlone) {
+  const Asset asset = test::mixed_asset();
+  const Object object = built(asset);
+  constexpr float kNan = std::numeric_limits<float>::quiet_NaN(),
+                  kInf = std::numeric_limits<float>::infinity();
+  std::vector<Vec3f> points = test::points_around(asset, 64, 23);
+  const std::vector<Vec3f> clean = points;
+  const Vec3f bad[] = {{kNan, 0, 0},  {0, kNan, 0},       {0, 0, kNan},         {kInf, 0, 0},
+                       {0, -kInf, 0}, {kNan, kInf, kNan}, {1e38F, 1e38F, 1e38F}};
+  for (std::size_t i = 0; i < std::size(bad); ++i) points[5 + 7 * i] = bad[i];
+  Batch batch(points.size());
+  object.query(points, batch.answers());
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const bool replaced = std::memcmp(&points[i], &clean[i], sizeof(Vec3f)) != 0;
+    EXPECT_TRUE(batch.holds(i, replaced ? Answer{} : object.query(clean[i]))) << i;
+  }
+}
+
+TEST_P(EveryTarget, FiniteForDenormalsCentresAxesAndSeams) {
+  const Object object = built(test::mixed_asset());
+  std::vector<Vec3f> points;
+  for (const float x : {-1.0F, -0.5F, -1e-30F, -1e-42F, 0.0F, 1e-42F, 0.5F, 1.0F}) {
+    for (const float y : {-0.5F, 0.0F, 1e-42F, 0.5F}) {
+      for (const float z : {-0.5F, -0.0F, 1e-40F, 0.5F}) points.push_back({x, y, z});
+    }
+  }
+  Batch batch(points.size());
+  for (const Layer layer : {Layer::kTwo, Layer::kThree}) {
+    object.query(points, batch.answers(), {layer});
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      ASSERT_FALSE(std::isinf(batch.distance_m[i]));
+      ASSERT_TRUE(std::isfinite(batch.normal[i].x) && std::isfinite(batch.surface_m[i].x));
+    }
+  }
+}
+
+TEST(Engine, AnswersScaleWithTheObject) {
+  // Lengths are kept in units near the object's radius, so a power of two changes nothing but the exponent.
+  const Object plain = built(test::mixed_asset());
+  const std::vector<Vec3f> points = test::points_around(test::mixed_asset(), 500, 24);
+  for (const int exponent : {-40, -3, 20, 44}) {
+    const double factor = std::ldexp(1.0, exponent);
+    const Object scaled = built(test::scaled(test::mixed_asset(), factor));
+    int known = 0;
+    for (const Vec3f& p : points) {
+      const Answer a = plain.query(p, {Layer::kThree});
+      const Answer b = scaled.query(static_cast<float>(factor) * p, {Layer::kThree});
+      EXPECT_TRUE(same(b.signed_distance_m, static_cast<float>(factor) * a.signed_distance_m));
+      EXPECT_EQ(a.normal, b.normal);
+      known += !std::isnan(a.signed_distance_m);
+    }
+    EXPECT_GT(known, 100);
+  }
+}
+
+TEST(Engine, FirstLayerAgreesWithTheExactFunction) {
+  std::mt19937_64 rng(25);
+  std::uniform_real_distribution<double> unit(-1, 1);
+  for (const double e1 : {0.1, 0.3, 1.0, 1.7, 2.0}) {
+    for (const double e2 : {0.1, 0.6, 1.0, 2.0}) {
+      Asset asset = test::mixed_asset();
+      asset.parts.resize(1);
+      asset.parts[0].shape = {{0.5, 0.3, 0.8}, e1, e2};
+      asset.parts[0].object_from_part = {};
+      const Resident resident(asset);
+      const double per_m = resident.units_per_m();
+      int inside = 0, wrong = 0;
+      for (int i = 0; i < 2000; ++i) {
+        const Vec3d d{0.5 * unit(rng), 0.3 * unit(rng), 0.8 * unit(rng)};
+        const double radial = inside_outside_radial(asset.parts[0].shape, d);
+        // On the surface but for 1e-5: nearer than any distance that the maps tell apart.
+        const double off = i % 2 == 0 ? 1 - 1e-5 : 1 + 1e-5;
+        const Vec3f p = cast<float>((per_m * off / radial) * d);
+        wrong += in_superquadric(resident.part(0), p) != (off < 1);
+        inside += off < 1;
+      }
+      EXPECT_EQ(wrong, 0) << e1 << ' ' << e2;
+      EXPECT_EQ(inside, 1000);
+    }
+  }
+}
+
+TEST(Resident, HoldsEveryCodeStartSheetAndSample) {
+  for (const std::uint32_t bits : {4U, 7U, 8U, 11U, 16U}) {
+    const Asset asset = test::mixed_asset(bits);
+    const Resident resident(asset);
+    ASSERT_TRUE(resident.fits());
+    std::size_t sheets = 0, samples = 0, starts = 0;
+    for (std::uint32_t k = 0; k < resident.part_count(); ++k) {
+      const DistanceMap& map = asset.parts[k].map;
+      const PartRecord& part = resident.part(k);
+      for (std::uint32_t texel = 0; texel < map.rows * map.cols; ++texel) {
+        const std::uint32_t held = resident.texel(part, texel);
+        ASSERT_EQ(held & part.miss_code, map.code[texel]);
+        ASSERT_EQ(held > part.miss_code, map.starts_inside(texel));
+        starts += map.starts_inside(texel);
+      }
+      for (std::uint32_t i = 0; i < map.crossings.size(); ++i) {
+        std::uint32_t at = resident.find(part.sheets, map.crossings[i].texel);
+        ASSERT_LE(at, i);
+        while (at < i && resident.key(part.sheets, at) == map.crossings[i].texel) ++at;
+        ASSERT_EQ(at, i);
+        ASSERT_EQ(resident.sheet_code(part, at), map.crossings[i].code);
+      }
+      for (const auto& sample : map.vertex_samples) {
+        const std::uint32_t at = resident.find(part.fans, sample.cell);
+        ASSERT_LT(at, part.fans.count);
+        ASSERT_EQ(resident.key(part.fans, at), sample.cell);
+        ASSERT_EQ(resident.fan_code(part, at), sample.code);
+        ASSERT_EQ(resident.fan_place(part, at), sample.row_256ths | sample.col_256ths << 8);
+      }
+      sheets += map.crossings.size();
+      samples += map.vertex_samples.size();
+    }
+    EXPECT_GT(sheets, 50U);
+    EXPECT_GT(samples, 50U);
+    EXPECT_GT(starts, 50U);
+  }
+}
+
+TEST(Resident, TakesTheBytesItsFormulaSays) {
+  const Asset asset = test::mixed_asset(7);
+  std::size_t bytes = 4;
+  for (const Part& part : asset.parts) {
+    const std::size_t texels = part.map.code.size();
+    bool seam = false;
+    for (const std::uint8_t b : part.map.start_inside) seam = seam || b != 0;
+    bytes += sizeof(PartRecord) + 520 + (texels * (part.map.bits + (seam ? 1U : 0U)) + 7) / 8;
+    const std::size_t blocks = (texels + 63) / 64;
+    if (!part.map.crossings.empty()) bytes += blocks + 6 * part.map.crossings.size();
+    if (!part.map.vertex_samples.empty()) bytes += blocks + 8 * part.map.vertex_samples.size();
+  }
+  EXPECT_EQ(Resident(asset).size(), bytes);
+  EXPECT_LT(sizeof(PartRecord), 256U);
+  EXPECT_GT(built(asset).resident_bytes(), bytes);
+  EXPECT_LT(built(asset).resident_bytes(), bytes + 200);
+}
+
+TEST(Resident, CurvesErrLessThanAMillionth) {
+  for (const double e : {0.1, 0.5, 1.0, 1.5, 2.0}) {
+    for (const Vec3d axes : {Vec3d{1, 0.9, 0.8}, Vec3d{1, 0.05, 0.05}, Vec3d{0.03, 1, 0.5}}) {
+      Asset asset = test::mixed_asset();
+      asset.parts.resize(1);
+      asset.parts[0].shape = {axes, e, 2 - 0.9 * e};
+      const Resident resident(asset);
+      ShapeTable<float> table;
+      resident.unpack(resident.part(0), table);
+      const auto eta = CurveTable<double>::of(std::sqrt(axes.x * axes.y), axes.z, e);
+      for (int k = 0; k <= CurveTable<double>::kCells; ++k) {
+        EXPECT_NEAR(table.eta.c[k], eta.c[k], 8e-6);
+        EXPECT_NEAR(table.eta.s[k], eta.s[k], 8e-6);
+        if (k == 0) continue;
+        // Differences of neighbours make the curvature.
+        EXPECT_NEAR(table.eta.c[k] - table.eta.c[k - 1], eta.c[k] - eta.c[k - 1],
+                    1.6e-5 * (eta.c[k - 1] - eta.c[k]) + 1e-5);
+      }
+      EXPECT_EQ(table.eta.c[CurveTable<double>::kCells], 0) << "a pole lies on the axis";
+      EXPECT_EQ(table.eta.s[0], 0);
+    }
+  }
+}
+
+// Against exhaustive search on a grid of 161 x 161 nodes an octant; exponents and ratios that the baker
+// makes.
+TEST(FootPoint, IsTheNearestOfAllButFewPoints) {
+  constexpr std::uint32_t kNodes = 160;
+  std::mt19937_64 rng(26);
+  std::uniform_real_distribution<double> unit(-1, 1);
+  int count = 0, worse = 0, much_worse = 0;
+  for (const double e1 : {0.3, 0.5, 1.0, 1.5}) {
+    for (const double e2 : {0.3, 0.5, 1.0, 1.5}) {
+      for (const Vec3d& a : {Vec3d{1, 0.8, 0.7}, Vec3d{1, 0.6, 0.3}, Vec3d{1, 1, 0.1}, Vec3d{0.2, 0.2, 2},
+                             Vec3d{0.05, 1, 0.5}, Vec3d{0.05, 0.05, 1}}) {
+        const Superquadric shape{a, e1, e2};
+        const ShapeTable<float> table(shape, 65, 128);
+        const auto eta = quadrant_nodes(std::sqrt(a.x * a.y), a.z, e1, kNodes);
+        const auto omega = quadrant_nodes(a.x, a.y, e2, kNodes);
+        for (int i = 0; i < 24; ++i, ++count) {
+          const Vec3d d{a.x * unit(rng), a.y * unit(rng), a.z * unit(rng)};
+          const double reach = i % 2 == 0 ? std::cbrt(std::abs(unit(rng))) : 0.8 + 0.2 * std::abs(unit(rng));
+          const Vec3d m = (reach / inside_outside_radial(shape, d)) * d;
+          const Vec3f q{std::abs(static_cast<float>(m.x)), std::abs(static_cast<float>(m.y)),
+                        std::abs(static_cast<float>(m.z))};
+          float least = std::numeric_limits<float>::infinity();
+          for (const auto& e : eta) {
+            for (const auto& o : omega) {
+              const Vec3f r = cast<float>(surface_point(shape, e, o)) - q;
+              least = std::min(least, dot(r, r));
+            }
+          }
+          const double excess = (table.foot(cast<float>(m)).depth_m - std::sqrt(least)) / norm(a);
+          EXPECT_GT(excess, -5e-3);
+          worse += excess > 1e-3;
+          much_worse += excess > 1e-2;
+        }
+      }
+    }
+  }
+  EXPECT_LE(worse, count * 6 / 1000);
+  EXPECT_LE(much_worse, count / 1000);
+}
+
+}  // namespace
+}  // namespace sqmap::runtime
