@@ -5,7 +5,9 @@
 #include <cmath>
 #include <limits>
 #include <random>
+#include <span>
 
+#include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
 #include "sqmap/asset/shape_table.hpp"
@@ -103,19 +105,31 @@ double eq35_percent(const Asset& asset, const std::vector<Probe>& probes, std::u
   return count > 0 ? 100 * sum / static_cast<double>(count) / asset.r_max_m : kNone;
 }
 
-double misclassified_percent(const std::vector<runtime::Answer>& answers, const ShellPoints& shell) {
+/// What the runtime says of each point.
+struct Told {
+  std::vector<float> signed_distance_m;  ///< NaN: unknown
+  std::vector<std::uint8_t> inside;
+};
+
+double misclassified_percent(const Told& told, const ShellPoints& shell) {
   std::size_t wrong = 0;
-  for (std::size_t i = 0; i < answers.size(); ++i)
-    wrong += answers[i].inside != (shell.signed_distance_m[i] < 0);
-  return answers.empty() ? kNone : 100.0 * static_cast<double>(wrong) / static_cast<double>(answers.size());
+  for (std::size_t i = 0; i < told.inside.size(); ++i)
+    wrong += (told.inside[i] != 0) != (shell.signed_distance_m[i] < 0);
+  return told.inside.empty() ? kNone
+                             : 100.0 * static_cast<double>(wrong) / static_cast<double>(told.inside.size());
 }
 
-std::vector<runtime::Answer> ask(const runtime::Object& object, const ShellPoints& shell,
-                                 const runtime::QueryOptions& options) {
-  std::vector<runtime::Answer> answers(shell.points_m.size());
-  tbb::parallel_for(std::size_t{0}, answers.size(),
-                    [&](std::size_t i) { answers[i] = object.query(shell.points_m[i], options); });
-  return answers;
+Told ask(const runtime::Object& object, const ShellPoints& shell, const runtime::QueryOptions& options) {
+  const std::size_t count = shell.points_m.size();
+  Told told{std::vector<float>(count), std::vector<std::uint8_t>(count)};
+  tbb::parallel_for(
+      tbb::blocked_range<std::size_t>(0, count, 1024), [&](const tbb::blocked_range<std::size_t>& range) {
+        runtime::Answers answers;
+        answers.signed_distance_m = std::span(told.signed_distance_m).subspan(range.begin(), range.size());
+        answers.inside = std::span(told.inside).subspan(range.begin(), range.size());
+        object.query(std::span(shell.points_m).subspan(range.begin(), range.size()), answers, options);
+      });
+  return told;
 }
 
 }  // namespace
@@ -164,10 +178,10 @@ std::vector<ErrorRow> measure(const Asset& asset, const runtime::Object& object,
     for (std::uint32_t layer = 1; layer <= 3; ++layer) {
       if (layer == 1 && level > 0) continue;  // layer 1 has no levels
       const runtime::QueryOptions options{static_cast<runtime::Layer>(layer), level};
-      const auto wide_answers = ask(object, wide, options), narrow_answers = ask(object, narrow, options);
+      const Told of_wide = ask(object, wide, options), of_narrow = ask(object, narrow, options);
       std::vector<double> errors;
-      for (std::size_t i = 0; i < wide_answers.size(); ++i) {
-        const double told_m = wide_answers[i].signed_distance_m;
+      for (std::size_t i = 0; i < of_wide.signed_distance_m.size(); ++i) {
+        const double told_m = of_wide.signed_distance_m[i];
         if (!std::isnan(told_m)) errors.push_back(std::abs(told_m - wide.signed_distance_m[i]));
       }
       std::sort(errors.begin(), errors.end());
@@ -180,10 +194,10 @@ std::vector<ErrorRow> measure(const Asset& asset, const runtime::Object& object,
       row.depth_mean_percent =
           errors.empty() ? kNone : 100 * sum / static_cast<double>(errors.size()) / asset.r_max_m;
       row.depth_p95_percent = errors.empty() ? kNone : 100 * errors[errors.size() * 95 / 100] / asset.r_max_m;
-      row.misclassified_3_percent = misclassified_percent(wide_answers, wide);
-      row.misclassified_05_percent = misclassified_percent(narrow_answers, narrow);
-      row.samples_3 = static_cast<std::uint32_t>(wide_answers.size());
-      row.samples_05 = static_cast<std::uint32_t>(narrow_answers.size());
+      row.misclassified_3_percent = misclassified_percent(of_wide, wide);
+      row.misclassified_05_percent = misclassified_percent(of_narrow, narrow);
+      row.samples_3 = static_cast<std::uint32_t>(of_wide.inside.size());
+      row.samples_05 = static_cast<std::uint32_t>(of_narrow.inside.size());
       row.samples_depth = static_cast<std::uint32_t>(errors.size());
       rows.push_back(row);
     }
@@ -194,15 +208,16 @@ std::vector<ErrorRow> measure(const Asset& asset, const runtime::Object& object,
 std::vector<double> error_by_part(const runtime::Object& object, const ShellPoints& shell,
                                   const std::vector<std::uint32_t>& part_of_face, std::uint32_t part_count,
                                   double worst_m, std::vector<std::uint32_t>& share) {
-  const auto answers = ask(object, shell, {runtime::Layer::kThree, 0});
+  const Told told = ask(object, shell, {runtime::Layer::kThree, 0});
   std::vector<double> error(part_count);
   share.assign(part_count, 0);
-  for (std::size_t i = 0; i < answers.size(); ++i) {
+  for (std::size_t i = 0; i < told.inside.size(); ++i) {
     const std::uint32_t part = part_of_face[shell.face[i]];
-    const double truth_m = shell.signed_distance_m[i], told_m = answers[i].signed_distance_m;
-    double e = std::isnan(told_m) ? (truth_m > 0 && !answers[i].inside ? 0 : worst_m)
+    const double truth_m = shell.signed_distance_m[i], told_m = told.signed_distance_m[i];
+    const bool inside = told.inside[i] != 0;
+    double e = std::isnan(told_m) ? (truth_m > 0 && !inside ? 0 : worst_m)
                                   : std::min(worst_m, std::abs(told_m - truth_m));
-    if (answers[i].inside != (truth_m < 0)) e = std::max(e, std::min(worst_m, 2 * std::abs(truth_m)));
+    if (inside != (truth_m < 0)) e = std::max(e, std::min(worst_m, 2 * std::abs(truth_m)));
     error[part] += e;
     ++share[part];
   }
