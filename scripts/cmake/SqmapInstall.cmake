@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 # What `cmake --install` puts where. Libraries come in two components, so that a user of the runtime never needs HDF5:
 #   runtime   sqmap::asset, sqmap::runtime    no dependency
-#   io        sqmap::io                       needs HDF5 and zlib
+#   io        sqmap::io, sqmap::c             needs HDF5 and zlib
 # libbake is not installed: it is GPL and only the programs need it.
 option(SQMAP_INSTALL "Install sqmap with the project that contains it" ${PROJECT_IS_TOP_LEVEL})
 if(NOT SQMAP_INSTALL)
@@ -25,8 +25,9 @@ endfunction()
 sqmap_install_component(runtime asset runtime)
 install(DIRECTORY ${PROJECT_SOURCE_DIR}/formats/include/sqmap/asset ${PROJECT_SOURCE_DIR}/libruntime/include/sqmap/runtime
         DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/sqmap)
+install(FILES ${PROJECT_SOURCE_DIR}/libruntime/include/sqmap/sqmap.h DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/sqmap)
 if(TARGET sqmap_io)
-  sqmap_install_component(io io)
+  sqmap_install_component(io io c)
   install(DIRECTORY ${PROJECT_SOURCE_DIR}/formats/include/sqmap/io DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/sqmap)
 endif()
 if(SQMAP_BUILD_BAKE)

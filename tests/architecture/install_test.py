@@ -16,6 +16,7 @@ import link_probe_test
 HERE = os.path.dirname(os.path.abspath(__file__))
 PROBE = os.path.join(HERE, "link_probe.cpp")
 SAMPLE = os.path.join(HERE, "..", "..", "samples", "query_bundle.cpp")
+C_PROGRAM = os.path.join(HERE, "..", "runtime", "c_api_test.c")
 
 
 def run(*command, expected=0, **options):
@@ -41,10 +42,16 @@ def check_prefix(prefix, work, compiler, bundle):
     """Both components, built against the installation at prefix."""
     link_probe_test.main(build_consumer(prefix, os.path.join(work, "runtime"), PROBE, compiler, "runtime",
                                         "-DCMAKE_DISABLE_FIND_PACKAGE_HDF5=ON"))
+    c_program = build_consumer(prefix, os.path.join(work, "c"), C_PROGRAM, compiler, "runtime",
+                               "-DCMAKE_DISABLE_FIND_PACKAGE_HDF5=ON", "-DLANGUAGES=C;CXX")
+    link_probe_test.check_libraries(c_program)
+    run(c_program)
     if bundle:
         sample = build_consumer(prefix, os.path.join(work, "io"), SAMPLE, compiler, "runtime;io", "-DLANGUAGES=C;CXX")
         answer = run(sample, bundle, input="0.3 0 0\n")
         assert "distance -0.100" in answer, f"{answer!r}: the point lies 0.1 m inside the ball"
+        run(build_consumer(prefix, os.path.join(work, "c_io"), C_PROGRAM, compiler, "runtime;io", "-DLANGUAGES=C;CXX",
+                           "-DCMAKE_C_FLAGS=-DSQMAP_TEST_LOAD"), bundle)
     else:
         text = configure(prefix, os.path.join(work, "io"), PROBE, compiler, "runtime;io", expected=1)
         assert "without its component io" in text, text

@@ -4,8 +4,11 @@
 #include <array>
 #include <cstdio>
 
+#include "sqmap/runtime/contacts.hpp"
 #include "sqmap/runtime/force.hpp"
+#include "sqmap/runtime/instance.hpp"
 #include "sqmap/runtime/object.hpp"
+#include "sqmap/runtime/sweep.hpp"
 
 #include "sphere_asset.hpp"
 
@@ -27,4 +30,13 @@ int main() {
                 force_n.y, force_n.z);
   }
   std::printf("%.3f %.3f %.3f\n", distances_m[0], distances_m[1], distances_m[2]);
+
+  // The ball at (1, 0, 0) and a point that flies 2 m to its centre.
+  const auto sweeper = sqmap::runtime::Sweeper::build(sqmap::test::sphere_asset());
+  const auto instance =
+      sqmap::runtime::Instance::place(object.value(), sqmap::runtime::Placement{{{}, {1, 0, 0}}});
+  if (!sweeper || !instance) return 1;
+  const auto first = sqmap::runtime::first_contact(instance.value(), points_m);
+  const auto met = sweeper.value().sweep(instance.value(), {{3, 0, 0}, {1, 0, 0}});
+  std::printf("%d %.1f\n", first ? 1 : 0, met.time);
 }
