@@ -128,7 +128,8 @@ struct Scored {
   Placed start;
 };
 
-Scored with_best_exponents(const Placed& start, std::span<const Vec3d> points, const Bounds& bounds, int grid) {
+Scored with_best_exponents(const Placed& start, std::span<const Vec3d> points, const Bounds& bounds,
+                           int grid) {
   Scored best{std::numeric_limits<double>::infinity(), start};
   Vector x = parameters(start);
   const auto node = [&](int parameter, int i) {

@@ -18,9 +18,9 @@ namespace {
 constexpr std::uint32_t kFirstQuadrantCells = 48;
 constexpr std::uint32_t kMostQuadrantCells = 192;
 constexpr std::uint32_t kLeastQuadrantCells = 4;
-// What may be lost, in targets, were it the only loss: to interpolated depth, and to occupancy (rays that pass
-// silhouettes and seams between texels put a share of space on the wrong side). A bound of errors over whole
-// rays; what points near the surface meet is less, by a factor found on the sample meshes.
+// What may be lost, in targets, were it the only loss: to interpolated depth, and to occupancy (rays that
+// pass silhouettes and seams between texels put a share of space on the wrong side). A bound of errors over
+// whole rays; what points near the surface meet is less, by a factor found on the sample meshes.
 constexpr double kInterpolationShare = 1.6;
 constexpr double kOccupancyShare = 1.15;
 // A uniform quantiser of step q errs by q/4 on average.

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// A chunk of points against all parts: sphere and box, layer 1, layers 2 and 3, and what the charts say together. Each
-// step is done by whole vectors of points that passed the one before.
+// A chunk of points against all parts: sphere and box, layer 1, layers 2 and 3, and what the charts say
+// together. Each step is done by whole vectors of points that passed the one before.
 
 /// What is known of each point so far: the variables of Object::query(point).
 struct alignas(64) Findings {
@@ -117,8 +117,8 @@ HWY_INLINE void replace(M mask, V value, float* array, VI index) {
 }
 
 HWY_NOINLINE void answer_deeper(const Resident& resident, std::uint32_t part_index, const PartPoints& points,
-                                bool third, const QueryOptions& options, const Wants& wants, Findings& findings,
-                                Chunk& chunk) {
+                                bool third, const QueryOptions& options, const Wants& wants,
+                                Findings& findings, Chunk& chunk) {
   const PartRecord& part = resident.part(part_index);
   const Chart chart(resident, part);
   const Looker looker(resident, part, chart, options.level);
@@ -136,13 +136,15 @@ HWY_NOINLINE void answer_deeper(const Resident& resident, std::uint32_t part_ind
     const VI inside = pick(look.inside, all_int(kInside), hn::Zero(kDI));
     const M sharper = hn::Gt(look.certainty, sharpest), nearer = hn::Lt(look.distance, nearest);
     flags = hn::Or(flags, all_int(third ? kThirdLayer : kSecondLayer));
-    if (wants.suspects) flags = hn::Or(flags, pick(hn::Or(look.inside, look.within), all_int(kSuspect), hn::Zero(kDI)));
+    if (wants.suspects)
+      flags = hn::Or(flags, pick(hn::Or(look.inside, look.within), all_int(kSuspect), hn::Zero(kDI)));
     flags = pick(sharper, hn::Or(hn::AndNot(all_int(kInside), flags), inside), flags);
     answering = pick(hn::And(sharper, as_float(hn::Eq(answering, nowhere))), this_part, answering);
     answering = pick(nearer, this_part, answering);
     const VI faces = pick(look.faces_patch, all_int(kNearestFaces), hn::Zero(kDI));
     const VI of_nearest = hn::Or(hn::ShiftLeft<1>(inside), faces);
-    flags = pick(nearer, hn::Or(hn::AndNot(all_int(kNearestInside | kNearestFaces), flags), of_nearest), flags);
+    flags =
+        pick(nearer, hn::Or(hn::AndNot(all_int(kNearestInside | kNearestFaces), flags), of_nearest), flags);
     hn::ScatterIndex(flags, kDI, findings.flags, index);
     hn::ScatterIndex(answering, kDI, chunk.part, index);
     hn::ScatterIndex(pick(sharper, look.certainty, sharpest), kD, findings.sharpest, index);
@@ -184,14 +186,14 @@ HWY_NOINLINE void conclude(const Resident& resident, const Findings& findings, C
   for (std::uint32_t i = 0; i < chunk.count; i += lane_count()) {
     const VI flags = hn::Load(kDI, findings.flags + i);
     const V nearest = hn::Load(kD, findings.nearest + i);
-    const M undisputed =
-        hn::Lt(hn::Load(kD, findings.sharpest + i), all(kOverrule) * hn::Load(kD, findings.nearest_certainty + i));
+    const M undisputed = hn::Lt(hn::Load(kD, findings.sharpest + i),
+                                all(kOverrule) * hn::Load(kD, findings.nearest_certainty + i));
     const M by_nearest = hn::And(has(flags, kNearestFaces), undisputed);
     const M inside =
         hn::Or(hn::And(by_nearest, has(flags, kNearestInside)), hn::AndNot(by_nearest, has(flags, kInside)));
     const V distance = pick(inside, hn::Neg(nearest), nearest) - hn::Load(kD, findings.offset + i);
-    hn::Store(pick(hn::Lt(nearest, infinity), unit * distance, all(std::numeric_limits<float>::quiet_NaN())), kD,
-              chunk.signed_distance_m + i);
+    hn::Store(pick(hn::Lt(nearest, infinity), unit * distance, all(std::numeric_limits<float>::quiet_NaN())),
+              kD, chunk.signed_distance_m + i);
     hn::Store(pick(inside, all_int(1), hn::Zero(kDI)), kDI, chunk.inside + i);
     const VI second = pick(has(flags, kSecondLayer), all_int(2), hn::Zero(kDI));
     const VI first = pick(has(flags, kFirstLayer), all_int(1), second);
@@ -200,10 +202,12 @@ HWY_NOINLINE void conclude(const Resident& resident, const Findings& findings, C
   }
 }
 
-void answer(const Resident& resident, const QueryOptions& options, const Wants& wants, Chunk& chunk) noexcept {
+void answer(const Resident& resident, const QueryOptions& options, const Wants& wants,
+            Chunk& chunk) noexcept {
   Findings findings;
   for (std::uint32_t i = 0; i < chunk.count; i += lane_count()) {
-    const M inside = in_ball(load3(chunk.x, chunk.y, chunk.z, i), resident.sphere_centre(), resident.sphere_square());
+    const M inside =
+        in_ball(load3(chunk.x, chunk.y, chunk.z, i), resident.sphere_centre(), resident.sphere_square());
     const V infinity = all(std::numeric_limits<float>::infinity()), zero = hn::Zero(kD);
     hn::Store(pick(inside, hn::Load(kD, chunk.x + i), infinity), kD, chunk.x + i);
     hn::Store(infinity, kD, findings.nearest + i);
@@ -246,7 +250,8 @@ void query(const Resident& resident, std::span<const Vec3f> points_m, const Answ
   wants.surface = !answers.surface_m.empty();
   const float scale = resident.units_per_m();
   for (std::size_t begin = 0; begin < points_m.size(); begin += kChunkPoints) {
-    const auto count = static_cast<std::uint32_t>(std::min<std::size_t>(kChunkPoints, points_m.size() - begin));
+    const auto count =
+        static_cast<std::uint32_t>(std::min<std::size_t>(kChunkPoints, points_m.size() - begin));
     chunk.count = count;
     for (std::uint32_t i = 0; i < count; ++i) {
       const Vec3f p = scale * points_m[begin + i];

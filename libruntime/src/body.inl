@@ -2,25 +2,29 @@
 //
 // Bodies of blocks: walks the blocks that touch the object, a chunk at a time.
 
-/// The placement in float, into the units of the resident. For scale 1 the result is exactly units_per_m times
-/// what row . p + t gives in metres.
+/// The placement in float, into the units of the resident. For scale 1 the result is exactly units_per_m
+/// times what row . p + t gives in metres.
 inline AffineF placement_in_units(const Resident& resident, const BodyPlacement& placement) noexcept {
   const Rotation<double> r = rotation<double>(placement.object_from_body.orientation);
   const double units_per_m = resident.units_per_m();
   AffineF map;
-  for (int k = 0; k < 3; ++k) map.row[k] = cast<float>((units_per_m * placement.scale) * r.row[static_cast<unsigned>(k)]);
+  for (int k = 0; k < 3; ++k)
+    map.row[k] = cast<float>((units_per_m * placement.scale) * r.row[static_cast<unsigned>(k)]);
   map.translation = cast<float>(units_per_m * placement.object_from_body.translation_m);
   return map;
 }
 HWY_INLINE V3 placed(const AffineF& map, const V3& p) {
-  return {dot3(all(map.row[0]), p) + all(map.translation.x), dot3(all(map.row[1]), p) + all(map.translation.y),
+  return {dot3(all(map.row[0]), p) + all(map.translation.x),
+          dot3(all(map.row[1]), p) + all(map.translation.y),
           dot3(all(map.row[2]), p) + all(map.translation.z)};
 }
 
 class BlockWalker {
  public:
   BlockWalker(const Resident& resident, const PointBody::Data& body, const BodyPlacement& placement) noexcept
-      : resident_(resident), body_(body), map_(placement_in_units(resident, placement)),
+      : resident_(resident),
+        body_(body),
+        map_(placement_in_units(resident, placement)),
         stretch_(static_cast<float>(placement.scale) * resident.units_per_m()) {
     float reach = 0;
     const Vec3f centre{dot(map_.row[0], body.centre_m) + map_.translation.x,
@@ -37,7 +41,8 @@ class BlockWalker {
     for (; next_ < end_; next_ += lane_count()) {
       const V3 centre = placed(map_, load3(body_.ball(0), body_.ball(1), body_.ball(2), next_));
       const V span = hn::Abs(centre.x) + hn::Abs(centre.y) + hn::Abs(centre.z) + all(travel());
-      const V radius = all(stretch_) * hn::LoadU(kD, body_.ball(3) + next_) * all(1 + kSlack) + span * all(kSlack);
+      const V radius =
+          all(stretch_) * hn::LoadU(kD, body_.ball(3) + next_) * all(1 + kSlack) + span * all(kSlack);
       const V3 d = centre - all(resident_.sphere_centre());
       const V reach = all(resident_.sphere_radius()) + radius;
       const M near = hn::And(hn::Le(dot3(d, d), reach * reach), hn::FirstN(kD, end_ - next_));
@@ -71,7 +76,8 @@ class BlockWalker {
   }
 
  private:
-  static constexpr float kSlack = 4e-6F;  // of all lengths that take part: rounding moves no point out of its ball
+  static constexpr float kSlack =
+      4e-6F;  // of all lengths that take part: rounding moves no point out of its ball
 
   float travel() const noexcept {
     return std::abs(map_.translation.x) + std::abs(map_.translation.y) + std::abs(map_.translation.z);
@@ -125,7 +131,8 @@ void query_body(const Resident& resident, const PointBody::Data& body, const Bod
       const std::uint32_t to = body.index[body_place(chunk, i)];
       if (!answers.signed_distance_m.empty()) answers.signed_distance_m[to] = chunk.signed_distance_m[i];
       if (wants.normal) answers.normal[to] = {chunk.normal[0][i], chunk.normal[1][i], chunk.normal[2][i]};
-      if (wants.surface) answers.surface_m[to] = {chunk.surface_m[0][i], chunk.surface_m[1][i], chunk.surface_m[2][i]};
+      if (wants.surface)
+        answers.surface_m[to] = {chunk.surface_m[0][i], chunk.surface_m[1][i], chunk.surface_m[2][i]};
       if (!answers.part.empty()) answers.part[to] = static_cast<std::uint32_t>(chunk.part[i]);
       if (!answers.layer.empty()) answers.layer[to] = static_cast<std::uint8_t>(chunk.layer[i]);
       if (!answers.inside.empty()) answers.inside[to] = static_cast<std::uint8_t>(chunk.inside[i]);

@@ -22,7 +22,8 @@
 #endif
 #endif
 
-// The baseline is what the compiler was told to assume: NEON on ARM, HWY_SCALAR (one lane, plain C++) on x86-64.
+// The baseline is what the compiler was told to assume: NEON on ARM, HWY_SCALAR (one lane, plain C++) on
+// x86-64.
 #define HWY_DISABLED_TARGETS \
   (HWY_SSSE3 | HWY_AVX3_DL | HWY_SVE | HWY_SVE2 | HWY_SVE_256 | HWY_SVE2_128 | HWY_RVV | HWY_WASM | HWY_PPC8)
 #define HWY_IS_DEBUG_BUILD 0  // its checks call into libhwy

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// powers.hpp, shape_table.hpp and resident.hpp for a vector of points. Included by engine.cpp, once for each target.
-// Only operations that IEEE 754 rounds exactly, in the order of the scalar code; no fused multiply-add.
+// powers.hpp, shape_table.hpp and resident.hpp for a vector of points. Included by engine.cpp, once for each
+// target. Only operations that IEEE 754 rounds exactly, in the order of the scalar code; no fused
+// multiply-add.
 
 const hn::ScalableTag<float> kD;
 using D = decltype(kD);
@@ -92,7 +93,8 @@ HWY_INLINE VU gather_bytes(const std::uint8_t* base, VI offset) {
   HWY_ALIGN std::int32_t offsets[kMostLanes];
   HWY_ALIGN std::uint32_t values[kMostLanes];
   hn::Store(offset, kDI, offsets);
-  for (std::uint32_t lane = 0; lane < lane_count(); ++lane) std::memcpy(&values[lane], base + offsets[lane], 4);
+  for (std::uint32_t lane = 0; lane < lane_count(); ++lane)
+    std::memcpy(&values[lane], base + offsets[lane], 4);
   return hn::Load(kDU, values);
 #endif
 }
@@ -224,14 +226,16 @@ SQMAP_KERNEL Sample sample_at(const ShapeTable<float>& table, V row, V col) {
   const V x_sign = pick(beyond, minus, one);
   const Place o = place_at(table.omega, pick(beyond, half_turn - along, along) * all(table.omega_per_col));
 
-  const V row_scale = z_sign * all(table.eta_per_row), col_scale = (x_sign * y_sign) * all(table.omega_per_col);
+  const V row_scale = z_sign * all(table.eta_per_row),
+          col_scale = (x_sign * y_sign) * all(table.omega_per_col);
   const V ax = all(table.axes_m.x), ay = all(table.axes_m.y), az = all(table.axes_m.z);
   const V x = ax * o.c, y = ay * o.s;
   Sample out;
   out.point = {x_sign * (x * e.c), y_sign * (y * e.c), z_sign * (az * e.s)};
   out.point_row = {(x_sign * row_scale) * (x * e.c_1), (y_sign * row_scale) * (y * e.c_1),
                    (z_sign * row_scale) * (az * e.s_1)};
-  out.point_col = {(x_sign * col_scale) * ((ax * o.c_1) * e.c), (y_sign * col_scale) * ((ay * o.s_1) * e.c), zero};
+  out.point_col = {(x_sign * col_scale) * ((ax * o.c_1) * e.c), (y_sign * col_scale) * ((ay * o.s_1) * e.c),
+                   zero};
 
   const V w = o.c * o.s_1 - o.s * o.c_1, w_1 = o.c * o.s_2 - o.s * o.c_2;
   const V bx = all(table.inverse_axes.x), by = all(table.inverse_axes.y), bz = all(table.inverse_axes.z);
@@ -243,7 +247,9 @@ SQMAP_KERNEL Sample sample_at(const ShapeTable<float>& table, V row, V col) {
   const V3 n_row = inverse * (g_row - dot3(n, g_row) * n);
   const V3 n_col = inverse * (g_col - dot3(n, g_col) * n);
   out.normal = {x_sign * n.x, y_sign * n.y, z_sign * n.z};
-  out.normal_row = {(x_sign * row_scale) * n_row.x, (y_sign * row_scale) * n_row.y, (z_sign * row_scale) * n_row.z};
-  out.normal_col = {(x_sign * col_scale) * n_col.x, (y_sign * col_scale) * n_col.y, (z_sign * col_scale) * n_col.z};
+  out.normal_row = {(x_sign * row_scale) * n_row.x, (y_sign * row_scale) * n_row.y,
+                    (z_sign * row_scale) * n_row.z};
+  out.normal_col = {(x_sign * col_scale) * n_col.x, (y_sign * col_scale) * n_col.y,
+                    (z_sign * col_scale) * n_col.z};
   return out;
 }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Chart (chart.hpp) for a vector of points: layers 2 and 3. What few points need (further sheets of a ray, fans of
-// vertex samples, the offset of faces) is left to Chart itself, a point at a time.
+// Chart (chart.hpp) for a vector of points: layers 2 and 3. What few points need (further sheets of a ray,
+// fans of vertex samples, the offset of faces) is left to Chart itself, a point at a time.
 
 /// What the lanes of one vector know: ChartAnswer.
 struct Look {
@@ -28,9 +28,14 @@ struct VPatch {
 class Looker {
  public:
   Looker(const Resident& resident, const PartRecord& part, const Chart& chart, std::uint32_t level) noexcept
-      : resident_(resident), part_(part), chart_(chart), stride_(part.stride_at(level)),
-        last_row_(static_cast<float>(part.rows - 1)), turn_(static_cast<float>(part.cols)),
-        size_(static_cast<float>(stride_)), inverse_size_(1.0F / size_) {}
+      : resident_(resident),
+        part_(part),
+        chart_(chart),
+        stride_(part.stride_at(level)),
+        last_row_(static_cast<float>(part.rows - 1)),
+        turn_(static_cast<float>(part.cols)),
+        size_(static_cast<float>(stride_)),
+        inverse_size_(1.0F / size_) {}
 
   SQMAP_KERNEL Look look(const V3& p, M wanted, bool third, const Wants& wants) const noexcept {
     const VFoot foot = foot_of(chart_.table(), p);
@@ -40,7 +45,8 @@ class Looker {
     const M eligible = hn::And(wanted, hn::Lt(second.distance, all(std::numeric_limits<float>::infinity())));
     if (none(eligible)) return second;
     const Look refined = third_layer(p, foot, eligible, wants);
-    const M better = hn::And(eligible, hn::Not(hn::AndNot(hn::Lt(refined.distance, second.distance), behind)));
+    const M better =
+        hn::And(eligible, hn::Not(hn::AndNot(hn::Lt(refined.distance, second.distance), behind)));
     second.distance = pick(better, refined.distance, second.distance);
     second.row = pick(better, refined.row, second.row);
     second.col = pick(better, refined.col, second.col);
@@ -84,7 +90,8 @@ class Looker {
       const VU word = gather_bytes(base, hn::ShiftRight<3>(bit));
       const VU shifted = word >> hn::And(hn::BitCast(kDU, bit), hn::Set(kDU, 7U));
       corners.texel[k] = hn::BitCast(kDI, hn::And(shifted, mask));
-      corners.eligible = hn::And(corners.eligible, as_float(hn::Lt(corners.texel[k], all_int(part_.miss_code))));
+      corners.eligible =
+          hn::And(corners.eligible, as_float(hn::Lt(corners.texel[k], all_int(part_.miss_code))));
       cell.depth[k] = depth_of(hn::And(corners.texel[k], all_int(part_.miss_code)));
     }
     return corners;
@@ -113,10 +120,11 @@ class Looker {
     return hn::RebindMask(kD, hn::Ne(bit, hn::Zero(kDU)));
   }
 
-  SQMAP_KERNEL Look second_layer(const VFoot& foot, M wanted, bool third, const Wants& wants, M& behind) const noexcept;
+  SQMAP_KERNEL Look second_layer(const VFoot& foot, M wanted, bool third, const Wants& wants,
+                                 M& behind) const noexcept;
   HWY_NOINLINE Look third_layer(const V3& p, const VFoot& foot, M active, const Wants& wants) const noexcept;
-  HWY_NOINLINE void further_sheets(M lanes, VI texel, V shift, V depth, V& gap, V& crossing, V& inside, V& leaving,
-                                   V& later) const noexcept;
+  HWY_NOINLINE void further_sheets(M lanes, VI texel, V shift, V depth, V& gap, V& crossing, V& inside,
+                                   V& leaving, V& later) const noexcept;
   HWY_NOINLINE void vertex_fans(M lanes, const V3& p, const VCell& cell, Look& look) const noexcept;
 
   const Resident& resident_;
@@ -127,7 +135,7 @@ class Looker {
 };
 
 SQMAP_KERNEL Look Looker::second_layer(const VFoot& foot, M wanted, bool third, const Wants& wants,
-                                      M& behind) const noexcept {
+                                       M& behind) const noexcept {
   const V zero = hn::Zero(kD), one = all(1.0F), half = all(0.5F);
   VCell cell = cell_at(foot.row, foot.col);
   const Corners corners = read(cell);
@@ -231,7 +239,8 @@ HWY_NOINLINE void Looker::further_sheets(M lanes, VI texel, V shift, V depth, V&
   later = hn::Load(kD, laters);
 }
 
-HWY_NOINLINE Look Looker::third_layer(const V3& p, const VFoot& foot, M active, const Wants& wants) const noexcept {
+HWY_NOINLINE Look Looker::third_layer(const V3& p, const VFoot& foot, M active,
+                                      const Wants& wants) const noexcept {
   const V zero = hn::Zero(kD), one = all(1.0F);
   const M asked = active;
   V row = foot.row, col = foot.col;
@@ -264,7 +273,8 @@ HWY_NOINLINE Look Looker::third_layer(const V3& p, const VFoot& foot, M active, 
     const V inverse = one / pick(regular, determinant, pick(rows_only, a, one));
     const V d_row_free = pick(regular, (c * f - b * g) * inverse, hn::IfThenElseZero(rows_only, f * inverse));
     const V d_col_free = hn::IfThenElseZero(regular, (a * g - b * f) * inverse);
-    const V slimness = hn::Sqrt(a / most(most(c, all(kLeastAngle) * a), all(std::numeric_limits<float>::min())));
+    const V slimness =
+        hn::Sqrt(a / most(most(c, all(kLeastAngle) * a), all(std::numeric_limits<float>::min())));
     const V most_col = least(all(turn_ * 0.125F), most_row * most(slimness, one));
     const V d_row = limited(d_row_free, hn::Neg(most_row), most_row);
     const V d_col = limited(d_col_free, hn::Neg(most_col), most_col);

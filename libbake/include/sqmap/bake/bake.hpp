@@ -19,11 +19,12 @@ struct BakeOptions {
   RepairOptions repair;
   DecomposeOptions decompose;
   FitOptions fit;
-  double max_error_percent = 0.05;       ///< target of eq. 35, percent of R_max, > 0
-  std::uint32_t max_parts = 24;          ///< in [1, kMaxParts]
-  std::uint64_t max_bytes = std::uint64_t{128} * 1024;  ///< of the stored maps, about; resolution gives way first
-  std::uint32_t sample_count = 20000;    ///< points of each error measurement
-  std::uint64_t seed = 1;                ///< of the sample points
+  double max_error_percent = 0.05;  ///< target of eq. 35, percent of R_max, > 0
+  std::uint32_t max_parts = 24;     ///< in [1, kMaxParts]
+  std::uint64_t max_bytes =
+      std::uint64_t{128} * 1024;       ///< of the stored maps, about; resolution gives way first
+  std::uint32_t sample_count = 20000;  ///< points of each error measurement
+  std::uint64_t seed = 1;              ///< of the sample points
 
   Outcome check() const;
   std::string to_json() const;
