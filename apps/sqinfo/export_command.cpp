@@ -15,13 +15,13 @@
 #include "sqmap/io/bundle.hpp"
 
 #include "../common/files.hpp"
+#include "../common/glb_writer.hpp"
 #include "../common/json_text.hpp"
+#include "../common/part_surface.hpp"
+#include "../common/source_mesh.hpp"
 #include "commands.hpp"
-#include "glb_writer.hpp"
 #include "map_image.hpp"
 #include "map_statistics.hpp"
-#include "part_surface.hpp"
-#include "source_mesh.hpp"
 
 namespace sqmap::apps {
 namespace {
@@ -102,7 +102,7 @@ Outcome export_maps(const Asset& asset, const ExportArguments& arguments) {
   for (std::size_t i = 0; i < asset.parts.size(); ++i) {
     const DistanceMap& map = asset.parts[i].map;
     const MapStatistics range = statistics(map);
-    const Result<std::vector<std::uint8_t>> png =
+    Result<std::vector<std::uint8_t>> png =
         map_png(map, arguments.map_level, range.depth_least_m, range.depth_most_m);
     if (!png) return png.error();
     const std::string name = fmt::format("part_{:02}.png", i);

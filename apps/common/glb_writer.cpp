@@ -118,7 +118,7 @@ void GlbScene::add_mesh(std::size_t group, const std::string& name, const Triang
 
 Result<std::vector<std::uint8_t>> GlbScene::bytes() const {
   const Document& d = *document_;
-  Json json{{"asset", {{"version", "2.0"}, {"generator", std::string("sqinfo ") + kVersion}}},
+  Json json{{"asset", {{"version", "2.0"}, {"generator", std::string("sqmap ") + kVersion}}},
             {"scene", 0},
             {"scenes", Json::array({{{"nodes", Json::array({0})}}})},
             {"nodes", d.nodes}};

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The one place where sqinfo uses assimp: it must not link the baker, whose reader is GPL.
+// The one place where sqinfo and sqsim use assimp: they must not link the baker, whose reader is GPL.
 #include "source_mesh.hpp"
 
 #include <exception>
@@ -13,7 +13,7 @@
 #define XXH_INLINE_ALL
 #include <xxhash.h>
 
-#include "../common/files.hpp"
+#include "files.hpp"
 
 namespace sqmap::apps {
 namespace {

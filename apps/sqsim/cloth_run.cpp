@@ -1,0 +1,133 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstdint>
+#include <deque>
+#include <string>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "sqmap/runtime/instance.hpp"
+
+#include "../common/files.hpp"
+#include "cloth.hpp"
+#include "frame_clock.hpp"
+#include "latency.hpp"
+#include "runs.hpp"
+#include "trace.hpp"
+
+namespace sqmap::apps {
+namespace {
+
+/// The objects, and room for the answers of a frame.
+struct Obstacles {
+  std::deque<runtime::Object> objects;  // instances keep their addresses
+  std::vector<runtime::Instance> instances;
+  std::vector<float> distance_m;
+  std::vector<Vec3f> normal;
+  std::vector<std::uint8_t> inside;
+};
+
+Outcome build(const LoadedScene& loaded, Obstacles& obstacles) {
+  for (const DrawnObject& drawn : loaded.objects) {
+    Result<runtime::Object> object = runtime::Object::build(*drawn.asset);
+    if (!object) return object.error();
+    obstacles.objects.push_back(std::move(object).value());
+    const Result<runtime::Instance> instance =
+        runtime::Instance::place(obstacles.objects.back(), drawn.placement);
+    if (!instance) return instance.error();
+    obstacles.instances.push_back(instance.value());
+  }
+  return Done{};
+}
+
+struct Collided {
+  std::uint32_t contacts{};
+  Vec3d impulse_n_s;  ///< on the cloth
+};
+
+Collided collide(Cloth& cloth, Obstacles& obstacles, const ClothEntry& entry,
+                 const runtime::QueryOptions& query) {
+  Collided result;
+  for (const runtime::Instance& instance : obstacles.instances) {
+    instance.query(
+        cloth.nodes_m(),
+        {.signed_distance_m = obstacles.distance_m, .normal = obstacles.normal, .inside = obstacles.inside},
+        query);
+    for (std::size_t i = 0; i < obstacles.distance_m.size(); ++i) {
+      const double gap_m = entry.thickness_m - static_cast<double>(obstacles.distance_m[i]);
+      if (gap_m > 0) {
+        result.impulse_n_s =
+            result.impulse_n_s + cloth.push_out(i, gap_m, cast<double>(obstacles.normal[i]), entry.friction);
+      } else if (std::isnan(gap_m) && obstacles.inside[i] != 0) {  // beside a seam: inside, depth unknown
+        result.impulse_n_s = result.impulse_n_s + cloth.put_back(i);
+      } else {
+        continue;
+      }
+      ++result.contacts;
+    }
+  }
+  return result;
+}
+
+Vec3d centre_of(std::span<const Vec3f> nodes_m) {
+  Vec3d sum;
+  for (const Vec3f& p : nodes_m) sum = sum + cast<double>(p);
+  return (1 / static_cast<double>(nodes_m.size())) * sum;
+}
+
+}  // namespace
+
+Outcome run_cloth(Console& console, const LoadedScene& loaded, const RunOptions& options) {
+  using Clock = std::chrono::steady_clock;
+  const ClothEntry& entry = *loaded.file.cloth;
+  Obstacles obstacles;
+  if (const Outcome ok = build(loaded, obstacles); !ok) return ok;
+  Cloth cloth(entry);
+  obstacles.distance_m.resize(cloth.nodes_m().size());
+  obstacles.normal.resize(cloth.nodes_m().size());
+  obstacles.inside.resize(cloth.nodes_m().size());
+
+  const double step_s = 1 / loaded.file.rate_hz;
+  const auto frames = static_cast<std::size_t>(std::llround(loaded.file.seconds * loaded.file.rate_hz));
+  std::vector<TraceRow> rows(std::max<std::size_t>(frames, 1));
+  std::vector<double> whole_us, ours_us;
+  whole_us.reserve(rows.size());
+  ours_us.reserve(rows.size());
+  FrameClock clock(loaded.file.rate_hz, options.is_fast);
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    clock.begin();
+    cloth.step(step_s);
+    const Clock::time_point fallen = Clock::now();
+    const Collided collided = collide(cloth, obstacles, entry, loaded.file.options.query);
+    ours_us.push_back(std::chrono::duration<double, std::micro>(Clock::now() - fallen).count());
+    whole_us.push_back(clock.end());
+    rows[i] = {static_cast<double>(i + 1) * step_s,
+               {{}, centre_of(cloth.nodes_m())},
+               cast<float>((1 / step_s) * collided.impulse_n_s),
+               {},
+               collided.contacts,
+               static_cast<int>(loaded.file.options.query.layer),
+               ours_us.back()};
+  }
+  console.out(fmt::format("cloth of {} nodes, {} frames at {} Hz{}\n", cloth.nodes_m().size(), rows.size(),
+                          loaded.file.rate_hz, options.is_fast ? ", not waited for" : ""));
+  console.out("collision alone:\n" + latency_text(ours_us));
+  console.out(fmt::format("with Bullet's cloth: median {:.1f} us, 99.9 % {:.1f} us, worst {:.1f} us\n",
+                          percentile(whole_us, 0.5), percentile(whole_us, 0.999), percentile(whole_us, 1)));
+  console.out(fmt::format("missed deadlines: {} ({} of them begun late by the system)\n", clock.missed(),
+                          clock.overslept()));
+  console.out(
+      fmt::format("last frame: {} of {} nodes in contact\n", rows.back().contacts, cloth.nodes_m().size()));
+  if (options.output.empty()) return Done{};
+  if (const Outcome ok = write_file(options.output / "trace.csv", trace_csv(rows)); !ok) return ok;
+  if (const Outcome ok = write_file(options.output / "trace.svg", trace_svg(rows, "sqsim: cloth")); !ok)
+    return ok;
+  const auto glb = picture_glb(loaded.objects, "cloth", cloth.surface());
+  if (!glb) return glb.error();
+  return write_file(options.output / "last_frame.glb", glb.value());
+}
+
+}  // namespace sqmap::apps

@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "sqmap/runtime/effects/touches.hpp"
+
+namespace sqmap::runtime {
+
+/// Map smoothing (paper 6.1 and Fig. 13a): depth and normal become means over the contact and six neighbours
+/// at a distance h along the axes of A.
+///
+///     depth <- 1/7 (depth + sum depth_i)          normal likewise, then of unit length
+///     surface <- point + depth * normal
+///
+/// The paper filters the stored map, whose texels are unequal in size and differ between charts; neighbours
+/// at a length in metres also blend across charts. The stencil does not turn with the normal, because one
+/// that does jumps where the normal jumps. Bias: on a ball of radius R the depth shrinks by 2 h^2 / (7 (R -
+/// depth)), in a hollow it grows by 2 h^2 / (7 (R + depth)), on a plane there is none. Six queries a contact.
+/// A neighbour without a distance counts as the contact itself.
+struct Smoothing {
+  static constexpr const char* kName = "smoothing";
+
+  float radius_m = 5e-3F;  ///< h
+
+  static std::span<const Parameter<Smoothing>> parameters() noexcept;
+  void touch(Touches& touches) noexcept;
+};
+
+}  // namespace sqmap::runtime

@@ -1,0 +1,236 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "sqmap/runtime/scene.hpp"
+
+#include <cmath>
+#include <limits>
+
+#include <gtest/gtest.h>
+#include <sys/prctl.h>
+#include <sys/syscall.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include "sqmap/runtime/effects/force_model.hpp"
+#include "sqmap/runtime/effects/friction.hpp"
+#include "sqmap/runtime/effects/reaction.hpp"
+
+#include "no_allocation.hpp"
+#include "touch_shapes.hpp"
+
+namespace sqmap::runtime {
+namespace {
+
+const Asset& ball_asset() {
+  static const Asset asset = test::ball_in_ellipsoid(test::kBallRadius_m, 65, 128);
+  return asset;
+}
+
+Scene built(const std::vector<SceneObject>& objects, Probe probe, const SceneOptions& options) {
+  auto scene = Scene::build(objects, std::move(probe), options);
+  EXPECT_TRUE(scene.ok()) << (scene ? "" : scene.error().finding);
+  return std::move(scene).value();
+}
+
+SceneOptions with(std::vector<EffectChoice> effects, Layer layer = Layer::kThree) {
+  SceneOptions options;
+  options.query.layer = layer;
+  options.effects = std::move(effects);
+  return options;
+}
+
+std::vector<EffectChoice> all_effects() {
+  std::vector<EffectChoice> choices;
+  for (const EffectInfo& info : effect_table()) choices.push_back({info.name, {}});
+  return choices;
+}
+
+Pose at(const Vec3d& p_m) { return {{}, p_m}; }
+
+TEST(Scene, EqualsTheModelComposedAtCompileTime) {
+  const auto points = test::sphere_points(400, 0.2, {});
+  Scene scene =
+      built({{&ball_asset(), {}}}, {points}, with({{"friction", {{"coefficient", 0.7F}}}, {"reaction", {}}}));
+  const Result<Object> object = Object::build(ball_asset());
+  const Result<Instance> instance = Instance::place(object.value(), Placement{});
+  Friction friction;
+  friction.coefficient = 0.7F;
+  ForceModel model(Reaction{}, friction);
+  ASSERT_TRUE(model.prepare(points.size()).ok());
+  for (int frame = 0; frame < 50; ++frame) {
+    const Vec3d p = test::kBallCentre_m + Vec3d{0.002 * frame, 0, 0.95};
+    std::vector<Vec3f> moved;
+    for (const Vec3f& q : points) moved.push_back(q + cast<float>(p));
+    const Vec3f expected = model.frame({&instance.value(), {Layer::kThree}}, {moved}).force_n;
+    ASSERT_EQ(scene.frame(at(p), {}, 1e-3F).wrench.force_n, expected);
+    ASSERT_GT(norm(expected), 1);
+  }
+}
+
+TEST(Scene, ForceTurnsAndGrowsWithTheObject) {
+  // The same touch, the object turned, moved, mirrored and twice as large.
+  const Quaternion turn{0.5, 0.5, -0.5, 0.5};
+  const Placement placement{{turn, {3, -2, 1}}, 2, true};
+  const auto points = test::sphere_points(400, 0.2, {});
+  std::vector<Vec3f> large;
+  for (const Vec3f& p : points) large.push_back(2.0F * p);
+  const auto effects = with({{"reaction", {}}, {"torque", {}}, {"impact_zones", {}}});
+  Scene plain = built({{&ball_asset(), {}}}, {points}, effects),
+        placed = built({{&ball_asset(), placement}}, {large}, effects);
+  const Vec3d p = test::kBallCentre_m + 0.95 * normalized(Vec3d{1, 2, 3});
+  const auto to_world = [&](Vec3d q) {
+    q.x = -q.x;
+    return rotation(turn).apply(2.0 * q) + placement.world_from_object.translation_m;
+  };
+  const Wrench a = plain.frame(at(p), p, 1e-3F).wrench,
+               b = placed.frame(at(to_world(p)), to_world(p), 1e-3F).wrench;
+  const Vec3d n = normalized(p - test::kBallCentre_m);
+  const Vec3d expected = to_world(test::kBallCentre_m + n) - to_world(test::kBallCentre_m);
+  EXPECT_NEAR(norm(b.force_n), 2 * norm(a.force_n), 0.02 * norm(b.force_n));
+  EXPECT_GT(dot(normalized(expected), normalized(cast<double>(b.force_n))), 0.999);
+}
+
+TEST(Scene, SumsTheForcesOfItsObjects) {
+  const Placement left{at({-1.0, 0, 0})}, right{at({1.0, 0, 0})};
+  const auto points = test::sphere_points(2000, 0.3, {});
+  const Pose middle = at(test::kBallCentre_m);
+  const auto force = [&](const std::vector<SceneObject>& objects) {
+    return built(objects, {points}, with({{"reaction", {}}})).frame(middle, {}, 1e-3F).wrench.force_n;
+  };
+  const Vec3f both = force({{&ball_asset(), left}, {&ball_asset(), right}});
+  const Vec3f a = force({{&ball_asset(), left}}), b = force({{&ball_asset(), right}});
+  EXPECT_GT(norm(a), 100);
+  EXPECT_LT(norm(both - a - b), 1e-3 * norm(a));
+}
+
+TEST(Scene, WhatIsNotNamedIsNotStored) {
+  const auto points = test::sphere_points(1000, 0.2, {});
+  const auto bytes = [&](std::vector<EffectChoice> effects) {
+    return built({{&ball_asset(), {}}}, {points}, with(std::move(effects))).resident_bytes();
+  };
+  const std::size_t plain = bytes({{"reaction", {}}});
+  EXPECT_GE(bytes({{"reaction", {}}, {"friction", {}}}), plain + 28000);
+  EXPECT_LT(bytes({{"reaction", {}}, {"texture", {}}, {"torque", {}}}), plain + 1000);
+  EXPECT_GT(bytes(all_effects()), plain + 56000);
+}
+
+TEST(Scene, FirstLayerReadsNoMap) {
+  Asset bare = ball_asset();
+  for (Part& part : bare.parts) part.map = {};
+  Scene scene = built({{&bare, {}}}, {{{0, 0, 0}}}, with({}, Layer::kOne));
+  EXPECT_EQ(scene.frame(at({1.14, 0, 0}), {}, 1e-3F).inside, 1U);
+  EXPECT_EQ(scene.frame(at({1.16, 0, 0}), {}, 1e-3F).inside, 0U);
+  EXPECT_LT(scene.resident_bytes(), 4096U);
+  EXPECT_FALSE(Scene::build(std::vector<SceneObject>{{&bare, {}}}, {{{0, 0, 0}}}, with({})).ok());
+}
+
+TEST(Scene, RefusesWhatItCannotDoAndSaysWhatItCan) {
+  const std::vector<SceneObject> objects{{&ball_asset(), {}}};
+  const auto finding = [&](const SceneOptions& options, Probe probe = {{{0, 0, 0}}}) {
+    const auto scene = Scene::build(objects, std::move(probe), options);
+    EXPECT_FALSE(scene.ok());
+    return scene ? "" : scene.error().finding + "; " + scene.error().remedy;
+  };
+  EXPECT_NE(finding(with({{"fricton", {}}})).find("\"fricton\""), std::string::npos);
+  EXPECT_NE(finding(with({{"fricton", {}}})).find("friction"), std::string::npos);
+  EXPECT_NE(finding(with({{"reaction", {{"stifness", 1.0F}}}})).find("stiffness_n_per_m"), std::string::npos);
+  EXPECT_NE(finding(with({{"friction", {}}})).find("needs \"reaction\""), std::string::npos);
+  EXPECT_NE(finding(with({{"reaction", {}}, {"reaction", {}}})).find("twice"), std::string::npos);
+  EXPECT_NE(finding(with({{"reaction", {}}}, Layer::kOne)).find("layer 1"), std::string::npos);
+  EXPECT_NE(finding(with({}), {{{0, 0, 0}}, {1, 2}}).find("2 weights"), std::string::npos);
+}
+
+TEST(Scene, APoseThatIsNotFiniteGivesZeroForceAndAFlag) {
+  Scene scene = built({{&ball_asset(), {}}}, {test::sphere_points(100, 0.2, {})}, with(all_effects()));
+  const Pose touching = at(test::kBallCentre_m + Vec3d{0, 0, 0.95});
+  EXPECT_GT(norm(scene.frame(touching, {}, 1e-3F).wrench.force_n), 0);
+  Pose bad = touching;
+  bad.orientation.x = std::numeric_limits<double>::quiet_NaN();
+  for (const Pose& pose : {bad, at({std::numeric_limits<double>::infinity(), 0, 0})}) {
+    const FrameResult result = scene.frame(pose, {}, 1e-3F);
+    EXPECT_FALSE(result.wrench.is_finite);
+    EXPECT_EQ(result.wrench.force_n, Vec3f{});
+  }
+  EXPECT_TRUE(scene.frame(at({1e300, 0, 0}), {}, 1e-3F).wrench.is_finite);
+  EXPECT_GT(norm(scene.frame(touching, {}, 1e-3F).wrench.force_n), 0);
+}
+
+void run_frames(Scene& scene, int count) {
+  for (int frame = 0; frame < count; ++frame) {
+    const double turn = 0.01 * frame;
+    scene.frame(at(test::kBallCentre_m + 0.97 * Vec3d{std::cos(turn), std::sin(turn), 0}), {}, 1e-3F);
+  }
+}
+
+TEST(Scene, FramesAllocateNothing) {
+  Scene scene = built({{&ball_asset(), {}}}, {test::sphere_points(300, 0.2, {})}, with(all_effects()));
+  const test::NoAllocation guard;
+  run_frames(scene, 200);
+}
+
+TEST(Scene, FramesCallNoSystem) {
+  Scene scene = built({{&ball_asset(), {}}}, {test::sphere_points(300, 0.2, {})}, with(all_effects()));
+  const pid_t child = fork();
+  ASSERT_GE(child, 0);
+  if (child == 0) {
+    // Strict seccomp: any call but read, write and exit of the thread kills.
+    constexpr int kStrict = 1;
+    if (prctl(PR_SET_SECCOMP, kStrict) != 0) syscall(SYS_exit, 77);
+    run_frames(scene, 200);
+    syscall(SYS_exit, 0);
+  }
+  int status = 0;
+  ASSERT_EQ(waitpid(child, &status, 0), child);
+  ASSERT_TRUE(WIFEXITED(status)) << "killed by signal " << WTERMSIG(status);
+  if (WEXITSTATUS(status) == 77) GTEST_SKIP() << "this kernel does not allow seccomp";
+  EXPECT_EQ(WEXITSTATUS(status), 0);
+}
+
+/// A mass on a spring whose other end is held 3 cm below the surface, let go above it: the largest energy
+/// ever, and that after a simulated minute at 1 kHz, as shares of the energy it started with.
+struct Energy {
+  double most{}, last{};
+  int contacts{};
+};
+
+Energy minute_of_bouncing(const Asset& asset, const Vec3d& surface_m, const Vec3d& n, const Vec3d& aside) {
+  constexpr double kMass_kg = 0.1, kCoupling_n_per_m = 50, kStiffness_n_per_m = 500, kStep_s = 1e-3;
+  constexpr double kDamping_n_s_per_m = 0.02;
+  Scene scene = built({{&asset, {}}}, {{{0, 0, 0}}},
+                      with({{"reaction", {{"stiffness_n_per_m", 500.0F}}}, {"friction", {}}}));
+  const Vec3d handle_m = surface_m - 0.03 * n;
+  Vec3d p = surface_m + 0.03 * n + 0.02 * aside, v;
+  const auto energy = [&](double depth_m) {
+    return 0.5 * kMass_kg * dot(v, v) + 0.5 * kCoupling_n_per_m * dot(handle_m - p, handle_m - p) +
+           0.5 * kStiffness_n_per_m * depth_m * depth_m;
+  };
+  const double start = energy(0);
+  Energy result;
+  for (int frame = 0; frame < 60000; ++frame) {
+    const FrameResult answer = scene.frame(at(p), p, kStep_s);
+    const auto touching = scene.contacts(0);
+    const double now = energy(touching.empty() ? 0 : touching[0].depth_m) / start;
+    result.contacts += touching.empty() ? 0 : 1;
+    result.most = std::max(result.most, now);
+    result.last = now;
+    const Vec3d force =
+        cast<double>(answer.wrench.force_n) + kCoupling_n_per_m * (handle_m - p) - kDamping_n_s_per_m * v;
+    v = v + (kStep_s / kMass_kg) * force;
+    p = p + kStep_s * v;
+  }
+  return result;
+}
+
+TEST(Scene, AProbePressedIntoABallOrABoxForAMinuteGainsNoEnergy) {
+  static const Asset box = test::box_asset({0.5, 0.4, 0.3});
+  const Vec3d n = normalized(Vec3d{1, 2, -1}), aside = normalized(cross(n, Vec3d{0, 0, 1}));
+  for (const Energy& energy :
+       {minute_of_bouncing(ball_asset(), test::kBallCentre_m + test::kBallRadius_m * n, n, aside),
+        minute_of_bouncing(box, {0.1, 0.05, 0.3}, {0, 0, 1}, {1, 0, 0})}) {
+    EXPECT_GT(energy.contacts, 10000);
+    EXPECT_LT(energy.most, 1.02);
+    EXPECT_LT(energy.last, 0.6);
+  }
+}
+
+}  // namespace
+}  // namespace sqmap::runtime
