@@ -31,7 +31,7 @@ if(TARGET sqmap_io)
   install(DIRECTORY ${PROJECT_SOURCE_DIR}/formats/include/sqmap/io DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/sqmap)
 endif()
 if(SQMAP_BUILD_BAKE)
-  install(TARGETS sqbake sqinfo RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
+  install(TARGETS sqbake sqinfo sqsim sqbench RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
 endif()
 
 configure_package_config_file(${CMAKE_CURRENT_LIST_DIR}/sqmapConfig.cmake.in sqmapConfig.cmake

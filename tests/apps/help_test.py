@@ -5,7 +5,7 @@ import unittest
 
 from support import run
 
-COMMANDS = {"sqbake": ["bake", "check"], "sqinfo": ["show", "validate", "query", "export", "diff"]}
+COMMANDS = {"sqbake": ["bake", "check"], "sqinfo": ["show", "validate", "query", "export", "diff"], "sqbench": ["run"]}
 
 
 class Help(unittest.TestCase):

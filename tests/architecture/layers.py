@@ -12,10 +12,13 @@ from fnmatch import fnmatch
 MODULES = [
     ("formats/include/sqmap/asset/*", {"asset"}),
     ("formats/*", {"asset", "io"}),
+    ("libruntime/src/c_api_load.cpp", {"asset", "io", "runtime", "sqmap.h"}),  # of the library sqmap_c
+    ("libruntime/src/c_api*", {"asset", "runtime", "sqmap.h"}),
     ("libruntime/*", {"asset", "runtime"}),
     ("libbake/include/*", {"asset", "bake"}),
     ("libbake/*", {"asset", "bake", "runtime"}),
     ("apps/sqbake/*", {"asset", "io", "runtime", "bake"}),
+    ("apps/sqbench/*", {"asset", "io", "runtime", "bake"}),
     ("apps/*", {"asset", "io", "runtime"}),
     ("samples/*", {"asset", "io", "runtime"}),
     ("tests/formats/*", {"asset", "io"}),
@@ -32,38 +35,45 @@ PRIVATE_HEADERS = [
     ("apps/common/*", ["apps/*", "tests/apps/*"]),
     ("apps/sqbake/*", ["apps/sqbake/*", "tests/apps/*"]),
     ("apps/sqinfo/*", ["apps/sqinfo/*", "tests/apps/*"]),
+    ("apps/sqsim/*", ["apps/sqsim/*", "tests/apps/*"]),
+    ("apps/sqbench/*", ["apps/sqbench/*", "tests/apps/*"]),
     ("tests/*", ["tests/*"]),
 ]
 
 # Third-party libraries: how an include of theirs begins, and the only files that may hold one.
 THIRD_PARTY = {
-    "CGAL": (("CGAL/", "boost/"), ["libbake/src/heat_method.cpp", "libbake/src/hull.cpp", "libbake/src/oracle.cpp"]),
+    "CGAL": (("CGAL/", "boost/"), ["libbake/src/heat_method.cpp", "libbake/src/hull.cpp", "libbake/src/oracle.cpp",
+                                   "apps/sqbench/peer_cgal.cpp"]),
     "Ceres": (("ceres/", "glog/"), ["libbake/src/fit_surface.cpp"]),
     "Eigen": (("Eigen/", "unsupported/"), ["libbake/src/fit.cpp", "libbake/src/fit_model.cpp",
                                            "libbake/src/fit_model.hpp", "libbake/src/fit_starts.cpp",
                                            "libbake/src/fit_volume.cpp", "libbake/src/heat_method.cpp",
                                            "libbake/src/partition.cpp"]),
-    "assimp": (("assimp/",), ["libbake/src/scene_reader.cpp", "apps/sqinfo/source_mesh.cpp"]),
-    "Embree": (("embree",), ["libbake/src/ray_tracer.cpp"]),
+    "assimp": (("assimp/",), ["libbake/src/scene_reader.cpp", "apps/common/source_mesh.cpp"]),
+    "Embree": (("embree",), ["libbake/src/ray_tracer.cpp", "apps/sqbench/embree_closest.cpp"]),
+    "Highway": (("hwy/",), ["apps/sqbench/grid_kernels.cpp", "libruntime/src/engine.cpp"]),
+    "FCL": (("fcl/",), ["apps/sqbench/peer_fcl.cpp"]),
     "TBB": (("tbb/", "oneapi/"), ["libbake/src/*.cpp", "apps/sqbake/worker_pool.cpp",
                                   "tests/bake/decompose_test.cpp"]),
     "HDF5": (("hdf5", "H5"), ["formats/src/hdf5_handle.cpp", "formats/src/reader.cpp", "formats/src/writer.cpp",
                               "tests/formats/hostile_test.cpp"]),
     "zlib": (("zlib.h",), ["formats/src/chunk.cpp", "tests/formats/hostile_test.cpp"]),
-    "xxHash": (("xxh",), ["formats/src/digest.cpp", "libbake/src/mesh_io.cpp", "apps/sqinfo/source_mesh.cpp",
+    "xxHash": (("xxh",), ["formats/src/digest.cpp", "libbake/src/mesh_io.cpp", "apps/common/source_mesh.cpp",
                           "tests/formats/bundle_bytes.cpp"]),
     "JSON": (("nlohmann/",), ["apps/*.cpp", "apps/common/json_text.hpp", "libbake/src/options.cpp"]),
     "CLI11, fmt": (("CLI/", "fmt/"), ["apps/*.cpp"]),
+    "Bullet": (("Bullet", "LinearMath/", "btBullet"), ["apps/sqsim/cloth.cpp"]),
     "libpng": (("png.h",), ["apps/sqinfo/map_image.cpp"]),
+    "RapidCheck": (("rapidcheck/",), ["tests/runtime/property_test.cpp"]),
     "GoogleTest": (("gtest/", "gmock/"), ["tests/*_test.cpp"]),
 }
 # The system's own interface; files, signals and terminals. None in a public header.
-POSIX = re.compile(r"(sys/\w+|unistd|fcntl)\.h$")
+POSIX = re.compile(r"(sys/\w+|unistd|fcntl|sched)\.h$")
 
 GPL = "GPL-3.0-or-later"
 APACHE = "Apache-2.0"
-GPL_PATHS = ["libbake/*", "apps/sqbake/*", "tests/bake/*"]
-SPDX_NAMES = ["*.cpp", "*.hpp", "*.py", "*.cmake", "*.in", "CMakeLists.txt"]
+GPL_PATHS = ["libbake/*", "apps/sqbake/*", "apps/sqbench/*", "tests/bake/*"]
+SPDX_NAMES = ["*.cpp", "*.hpp", "*.c", "*.h", "*.py", "*.cmake", "*.in", "CMakeLists.txt"]
 INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^>"]+)[>"]')
 SKIPPED_FOLDERS = re.compile(r"(\.git|build.*|__pycache__)$")
 

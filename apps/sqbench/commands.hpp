@@ -1,0 +1,12 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <functional>
+
+#include "../common/program.hpp"
+
+namespace sqmap::apps {
+
+std::function<Exit(Console&)> declare_run(CLI::App& app);
+
+}  // namespace sqmap::apps

@@ -1,0 +1,261 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+//
+// The page: what was found in words, then every table and picture. One file without scripts or links to
+// others.
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <set>
+
+#include <fmt/format.h>
+
+#include "peer.hpp"
+#include "results.hpp"
+#include "svg.hpp"
+
+namespace sqmap::bench {
+namespace {
+
+constexpr const char* kStyle =
+    "body{font-family:sans-serif;max-width:960px;margin:2em auto;padding:0 1em;color:#222}"
+    "table{border-collapse:collapse;margin:1em 0;font-size:13px}"
+    "td,th{padding:2px 8px;border-bottom:1px solid #ddd;text-align:right}"
+    "td:first-child,th:first-child,td:nth-child(2),th:nth-child(2){text-align:left}"
+    "tr.ours{background:#fbeeec}svg{max-width:100%;height:auto;border:1px solid #eee;margin:.5em 0}";
+
+std::string number(double value) { return std::isnan(value) ? "-" : fmt::format("{:.3g}", value); }
+
+class Table {
+ public:
+  explicit Table(const std::vector<std::string>& heads) { add(heads, "th", false); }
+  void row(const std::vector<std::string>& cells, bool is_ours) { add(cells, "td", is_ours); }
+  std::string html() const { return "<table>\n" + rows_ + "</table>\n"; }
+
+ private:
+  void add(const std::vector<std::string>& cells, const char* tag, bool is_ours) {
+    rows_ += is_ours ? "<tr class=\"ours\">" : "<tr>";
+    for (const std::string& cell : cells) rows_ += fmt::format("<{0}>{1}</{0}>", tag, escaped(cell));
+    rows_ += "</tr>\n";
+  }
+  std::string rows_;
+};
+
+bool is_ours(const std::string& peer) { return peer.starts_with("sqmap"); }
+
+std::string sentence(const std::string& words) { return "<p>" + escaped(words) + "</p>\n"; }
+
+/// Per work, our layer 3 against the reference and against whoever is fastest.
+std::string frame_words(const Results& results) {
+  std::string words;
+  for (const char* work : {"touching", "far", "grasp"}) {
+    double log_ratio = 0;
+    std::size_t models = 0, won = 0;
+    std::map<std::string, std::size_t> fastest;
+    for (const ModelRow& model : results.models) {
+      const FrameRow *ours = nullptr, *best = nullptr;
+      for (const FrameRow& row : results.frames) {
+        if (row.model != model.model || row.work != work) continue;
+        if (row.peer == "sqmap-layer3") ours = &row;
+        if (!is_ours(row.peer) && (best == nullptr || row.us.median < best->us.median)) best = &row;
+      }
+      if (ours == nullptr || best == nullptr) continue;
+      log_ratio += std::log(ours->ratio.median);
+      ++models;
+      if (ours->us.median < best->us.median) ++won;
+      ++fastest[best->peer];
+    }
+    if (models == 0) continue;
+    const auto rival = std::max_element(fastest.begin(), fastest.end(),
+                                        [](const auto& a, const auto& b) { return a.second < b.second; });
+    const double ratio = std::exp(log_ratio / static_cast<double>(models));
+    words += sentence(
+        fmt::format("Frames, {}: sqmap (layer 3) takes {:.2f} times as long as {} (geometric mean over {} "
+                    "models), so it {}. The "
+                    "fastest rival is {} on most models; sqmap beats the fastest rival on {} of {}.",
+                    work, ratio, kReference, models,
+                    ratio < 1 ? "wins against that grid" : "loses to that grid", rival->first, won, models));
+  }
+  return words;
+}
+
+/// The target of the project: at no budget of 8 to 128 KB may a rival be both more accurate near contact and
+/// faster.
+std::string accuracy_words(const Results& results) {
+  std::string words;
+  std::size_t cases = 0, beaten = 0;
+  std::set<std::string> by;
+  double wrong = 0, answered = 0;
+  double rivals_least = 100;
+  std::size_t models = 0;
+  for (const AccuracyRow& ours : results.accuracy) {
+    if (ours.shell_percent > 0.51) continue;
+    if (!is_ours(ours.peer)) rivals_least = std::min(rivals_least, ours.answered_outside_percent);
+    if (!is_ours(ours.peer)) continue;
+    if (ours.peer == "sqmap-layer3") {
+      wrong += ours.wrong_side_percent;
+      answered += ours.answered_outside_percent;
+      ++models;
+    }
+    const auto bytes_of = [&](const std::string& peer) {
+      const auto it = std::find_if(results.peers.begin(), results.peers.end(), [&](const PeerRow& row) {
+        return row.model == ours.model && row.peer == peer;
+      });
+      return it == results.peers.end() ? INFINITY : static_cast<double>(it->bytes);
+    };
+    const double budget = bytes_of(ours.peer);
+    ++cases;
+    for (const AccuracyRow& rival : results.accuracy)
+      if (rival.model == ours.model && rival.shell_percent == ours.shell_percent && !is_ours(rival.peer) &&
+          bytes_of(rival.peer) <= budget && rival.mean_error_percent < ours.mean_error_percent &&
+          rival.ns.median < ours.ns.median) {
+        ++beaten;
+        by.insert(rival.peer);
+        break;
+      }
+  }
+  if (cases == 0) return words;
+  std::string names;
+  for (const std::string& name : by) names += (names.empty() ? "" : ", ") + name;
+  words += sentence(
+      beaten == 0
+          ? fmt::format(
+                "Near contact (+-0.5 % shell), for none of {} settings of sqmap is a rival at once smaller, "
+                "more accurate and faster a point.",
+                cases)
+          : fmt::format(
+                "Near contact (+-0.5 % shell), sqmap loses at {} of {} settings: a rival is at once smaller, "
+                "more accurate and faster a point ({}).",
+                beaten, cases, names));
+  if (models > 0)
+    words += sentence(fmt::format(
+        "In that shell sqmap (layer 3) puts {:.2g} % of the points on the wrong side, "
+        "and of the points outside the "
+        "object it knows a distance for {:.3g} %: the others lie outside every "
+        "superquadric. Of the rivals that tell distances, none knows less than {:.4g} %.",
+        wrong / static_cast<double>(models), answered / static_cast<double>(models), rivals_least));
+  return words;
+}
+
+std::string tables(const Results& results) {
+  std::string html;
+  if (!results.works.empty()) {
+    Table table(
+        {"model", "work", "poses", "points", "contacts", "points within 3 %", "deepest, %", "nearest, %"});
+    for (const WorkRow& row : results.works)
+      table.row({row.model, row.work, fmt::to_string(row.poses), fmt::to_string(row.probe_points),
+                 number(row.contacts_mean), number(row.near_mean), number(row.deepest_percent),
+                 number(row.nearest_percent)},
+                false);
+    html += "<h2>The work</h2>\n" + table.html();
+  }
+  if (!results.frames.empty()) {
+    Table table(
+        {"model", "peer", "work", "answers", "us, median", "quartiles", "ratio to reference", "quartiles"});
+    for (const FrameRow& row : results.frames)
+      table.row({row.model, row.peer, row.work, number(row.answers_mean), number(row.us.median),
+                 number(row.us.lower) + " - " + number(row.us.upper), number(row.ratio.median),
+                 number(row.ratio.lower) + " - " + number(row.ratio.upper)},
+                is_ours(row.peer));
+    html += "<h2>Frames</h2>\n" + table.html();
+  }
+  if (!results.accuracy.empty()) {
+    Table table({"model", "peer", "shell, %", "mean error, %", "95th, %", "wrong side, %", "normal, deg",
+                 "answered in/out, %", "ns a point"});
+    for (const AccuracyRow& row : results.accuracy)
+      table.row({row.model, row.peer, number(row.shell_percent), number(row.mean_error_percent),
+                 number(row.p95_error_percent), number(row.wrong_side_percent), number(row.normal_mean_deg),
+                 number(row.answered_inside_percent) + " / " + number(row.answered_outside_percent),
+                 number(row.ns.median)},
+                is_ours(row.peer));
+    html += "<h2>Accuracy</h2>\n" + table.html();
+  }
+  if (!results.peers.empty()) {
+    Table table({"model", "peer", "KB resident", "build, s", "stated error, %", "of"});
+    for (const PeerRow& row : results.peers)
+      table.row({row.model, row.peer, number(static_cast<double>(row.bytes) / 1e3), number(row.build_s),
+                 number(row.stated_error_percent), row.stated_is_mean ? "mean" : "every point"},
+                is_ours(row.peer));
+    html +=
+        "<h2>Peers</h2>\n<p>Build time starts from the mesh; for sqmap from the bundle, whose baking is a "
+        "table of its "
+        "own.</p>\n" +
+        table.html();
+  }
+  if (!results.memory.empty()) {
+    Table table({"model", "method", "KB", "source"});
+    for (const MemoryRow& row : results.memory)
+      table.row(
+          {row.model, row.method, number(row.bytes / 1e3), row.is_paper ? "paper, Table 1" : "measured"},
+          is_ours(row.method));
+    html += "<h2>Memory</h2>\n" + table.html();
+  }
+  if (!results.bake.empty()) {
+    Table table({"model", "method", "target, %", "seconds", "KB", "eq. 35, %", "parts"});
+    for (const BakeRow& row : results.bake)
+      table.row({row.model, row.method, number(row.target_percent), number(row.seconds),
+                 number(row.bytes / 1e3), number(row.eq35_percent), fmt::to_string(row.parts)},
+                is_ours(row.method));
+    html += "<h2>Baking</h2>\n" + table.html();
+  }
+  if (!results.force.empty()) {
+    Table table({"model", "peer", "steps", "jumps over 10 %, %", "worst, %", "mean change, %",
+                 "direction, deg", "unanswered, %"});
+    for (const ForceRow& row : results.force)
+      table.row({row.model, row.peer, fmt::to_string(row.steps), number(row.jumps_percent),
+                 number(row.worst_jump_percent), number(row.mean_change_percent),
+                 number(row.direction_error_deg), number(row.unanswered_percent)},
+                is_ours(row.peer));
+    html += "<h2>Force along a slide</h2>\n" + table.html();
+  }
+  if (!results.effects.empty()) {
+    Table table({"model", "asked for", "us a frame", "quartiles"});
+    for (const EffectRow& row : results.effects)
+      table.row({row.model, row.variant, number(row.us.median),
+                 number(row.us.lower) + " - " + number(row.us.upper)},
+                true);
+    html += "<h2>What is asked for</h2>\n" + table.html();
+  }
+  if (!results.checks.empty()) {
+    Table table({"model", "peer", "claim", "found", "allowed", "holds"});
+    for (const CheckRow& row : results.checks)
+      table.row(
+          {row.model, row.peer, row.claim, number(row.found), number(row.allowed), row.holds ? "yes" : "NO"},
+          is_ours(row.peer));
+    html += "<h2>Checks against the exact mesh</h2>\n" + table.html();
+  }
+  return html;
+}
+
+}  // namespace
+
+std::string results_page(const Results& results, const std::vector<Picture>& pictures) {
+  const Machine& m = results.machine;
+  std::string html = fmt::format(
+      "<!DOCTYPE html>\n<html lang=\"en\">\n<head><meta charset=\"utf-8\"><title>sqbench</title>\n"
+      "<link rel=\"icon\" href=\"data:,\"><style>{}</style></head>\n<body>\n<h1>What accuracy costs in "
+      "time</h1>\n",
+      kStyle);
+  html += sentence(fmt::format("{}; {}, one thread{}, {}, {}, {}.", results.command, m.cpu,
+                               m.is_pinned ? ", pinned to one core" : "", m.instruction_set, m.compiler,
+                               m.kernel));
+  if (results.is_smoke) html += sentence("A smoke run: a few poses and points. The times mean little.");
+  html += "<h2>In words</h2>\n" + frame_words(results) + accuracy_words(results);
+  const auto broken = static_cast<std::size_t>(std::count_if(results.checks.begin(), results.checks.end(),
+                                                             [](const CheckRow& row) { return !row.holds; }));
+  if (!results.checks.empty())
+    html += sentence(fmt::format("{} of {} checks of the answers against the exact mesh hold.",
+                                 results.checks.size() - broken, results.checks.size()));
+  html += sentence(
+      "Every method is asked the same: signed distance, unit gradient and reaction force of each point "
+      "within 3 % of R_max "
+      "of the surface; the OBB tree tells the pairs of triangles that cross. All methods get the points "
+      "sorted into blocks "
+      "of 32 neighbours. Times are medians; in each repetition all methods take turns, and ratios are formed "
+      "within a "
+      "repetition.");
+  if (!pictures.empty()) html += "<h2>Pictures</h2>\n";
+  for (const Picture& picture : pictures) html += "<figure>" + picture.svg + "</figure>\n";
+  return html + tables(results) + "</body>\n</html>\n";
+}
+
+}  // namespace sqmap::bench

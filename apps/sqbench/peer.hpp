@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+//
+// What every method answers, so that their times can be compared: for one placed cloud, the signed distance,
+// unit gradient and reaction force of each point that lies within kBand of the surface. Or, where a method
+// knows triangles only: the pairs of triangles that cross.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "cloud.hpp"
+#include "model.hpp"
+
+namespace sqmap::bench {
+
+/// How far a peer's distances may be from the truth, in percent of R_max. The tests hold it to that.
+struct StatedError {
+  double percent{};
+  bool is_mean{};  ///< of the mean over the +-3 % shell; otherwise of every point
+};
+
+class Peer {
+ public:
+  virtual ~Peer() = default;
+  /// Replaces the content of `hits`, which has room for every point of the cloud.
+  virtual void answer(const Cloud& cloud, const Placement& object_from_cloud, Hits& hits) const = 0;
+  /// Which points of the cloud are inside, for methods that know it of points whose distance they do not
+  /// know. False: the method has no more to say than its distances do; `inside` is untouched.
+  virtual bool sides(const Cloud&, const Placement&, std::vector<std::uint8_t>& /*inside*/) const {
+    return false;
+  }
+  virtual std::size_t bytes() const = 0;  ///< memory resident for queries
+  virtual StatedError stated_error() const = 0;
+  virtual double field_s() const { return 0; }  ///< time of the exact field it was made from, if any
+};
+
+/// A method at one setting, by a name that reports keep.
+struct Entrant {
+  std::string id;      ///< e.g. "grid-int16-128-simd"
+  std::string family;  ///< methods that differ only in their setting, e.g. "grid-int16-simd"
+  std::function<std::unique_ptr<Peer>(const Model&)> build;
+};
+
+/// A method that tells which triangles of the probe and the object cross.
+class ContactPeer {
+ public:
+  virtual ~ContactPeer() = default;
+  virtual std::size_t contacts(const Placement& object_from_probe) const = 0;
+  virtual std::size_t bytes() const = 0;  ///< of the object's side
+};
+std::unique_ptr<ContactPeer> make_fcl(const Model& model, const bake::Mesh& probe, bool first_contact_only);
+/// The same number by testing every pair.
+std::size_t count_crossing_pairs(const Model& model, const bake::Mesh& probe,
+                                 const Placement& object_from_probe);
+
+/// The method that ratios refer to: the strongest rival.
+inline constexpr const char* kReference = "grid-int16-128-simd";
+
+// One source a method.
+std::unique_ptr<Peer> make_sqmap(const Model& model, int layer, unsigned level);
+enum class GridCode { kFloatScalar, kFloatSimd, kInt16Simd, kInt16SimdCulled };
+std::unique_ptr<Peer> make_grid(const Model& model, GridCode code, unsigned resolution);
+std::unique_ptr<Peer> make_bricks(const Model& model, unsigned resolution);
+std::unique_ptr<Peer> make_embree(const Model& model);
+std::unique_ptr<Peer> make_cgal(const Model& model);
+
+/// The methods of the suites. `smoke`: a few of each kind.
+std::vector<Entrant> frame_entrants(bool smoke);
+std::vector<Entrant> accuracy_entrants(const Model& model, bool smoke);
+
+}  // namespace sqmap::bench

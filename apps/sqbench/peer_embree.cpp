@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "closest.hpp"
+#include "exact_answer.hpp"
+#include "peer.hpp"
+
+namespace sqmap::bench {
+namespace {
+
+/// Embree's point query with the band as its radius.
+class EmbreePeer : public Peer {
+ public:
+  explicit EmbreePeer(const Model& model)
+      : closest_(model.mesh), normals_(model.mesh), near_(model), band_m_(kBand * model.r_max_m()) {}
+
+  void answer(const Cloud& cloud, const Placement& placement, Hits& hits) const override {
+    hits.count = 0;
+    for (std::size_t i = 0; i < cloud.count; ++i) {
+      const Vec3f p_m = placement.apply(cloud.points_m[i]);
+      if (!near_.holds(p_m)) continue;
+      const Vec3d p = cast<double>(p_m);
+      const auto found = closest_.nearest(p, band_m_);
+      if (found.is_found) add_exact(i, p, found.nearest_m, normals_.at(found.face, found.feature), hits);
+    }
+  }
+  std::size_t bytes() const override { return sizeof(*this) + closest_.bytes() + normals_.bytes(); }
+  StatedError stated_error() const override { return {1e-4, false}; }
+
+ private:
+  EmbreeClosest closest_;
+  Pseudonormals normals_;
+  NearBox near_;
+  double band_m_;
+};
+
+}  // namespace
+
+std::unique_ptr<Peer> make_embree(const Model& model) { return std::make_unique<EmbreePeer>(model); }
+
+}  // namespace sqmap::bench

@@ -1,0 +1,144 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include <fmt/format.h>
+
+#include "results.hpp"
+#include "svg.hpp"
+
+namespace sqmap::bench {
+namespace {
+
+/// Exact methods would stretch the logarithmic axis by decades.
+constexpr double kLeastError_percent = 0.001;
+
+bool is_ours(const std::string& peer) { return peer.starts_with("sqmap"); }
+
+const PeerRow* find_peer(const Results& results, const std::string& model, const std::string& peer) {
+  const auto it = std::find_if(results.peers.begin(), results.peers.end(),
+                               [&](const PeerRow& row) { return row.model == model && row.peer == peer; });
+  return it == results.peers.end() ? nullptr : &*it;
+}
+
+/// Series in the order in which their families first occur.
+class SeriesByFamily {
+ public:
+  void add(const std::string& family, Disc disc) {
+    if (!(disc.x > 0) || !(disc.y > 0))
+      return;  // NaN, or no error at all: has no place on a logarithmic axis
+    auto it =
+        std::find_if(series.begin(), series.end(), [&](const Series& one) { return one.name == family; });
+    if (it == series.end()) it = series.insert(it, {family, {}});
+    it->discs.push_back(std::move(disc));
+  }
+  std::vector<Series> series;
+};
+
+void add_accuracy(const Results& results, std::vector<Picture>& pictures) {
+  for (const ModelRow& model : results.models) {
+    for (const double shell : {3.0, 0.5}) {
+      SeriesByFamily time, size, angle;
+      for (const AccuracyRow& row : results.accuracy) {
+        if (row.model != model.model || std::abs(row.shell_percent - shell) > 1e-9) continue;
+        const PeerRow* peer = find_peer(results, row.model, row.peer);
+        if (peer == nullptr) continue;
+        const auto bytes = static_cast<double>(peer->bytes);
+        const std::string label =
+            fmt::format("{}: {:.3g} %, {:.3g} ns a point, {:.3g} KB, normals {:.2g} deg", row.peer,
+                        row.mean_error_percent, row.ns.median, bytes / 1e3, row.normal_mean_deg);
+        const double shown_percent = std::max(row.mean_error_percent, kLeastError_percent);
+        time.add(peer->family, {shown_percent, row.ns.median, bytes, label});
+        size.add(peer->family, {shown_percent, bytes / 1e3, bytes, label});
+        angle.add(peer->family, {std::max(row.normal_mean_deg, 0.1), bytes / 1e3, bytes, label});
+      }
+      if (time.series.empty()) continue;
+      const std::string name = fmt::format("{}-{}", model.model, shell == 3.0 ? "3" : "05");
+      const std::string where = fmt::format("{}, +-{} % shell", model.model, shell);
+      const std::string error =
+          fmt::format("mean distance error, % of R_max; below {} drawn there", kLeastError_percent);
+      pictures.push_back(
+          {"time-" + name, where + ": time and error",
+           scatter_svg(where + ": what accuracy costs in time", error, "ns a point", time.series)});
+      if (shell != 3.0) continue;
+      pictures.push_back(
+          {"size-" + name, where + ": memory and error",
+           scatter_svg(where + ": what accuracy costs in memory", error, "KB resident", size.series)});
+      pictures.push_back({"normals-" + name, where + ": memory and normals",
+                          scatter_svg(where + ": what good normals cost in memory",
+                                      "mean angle to the true normal, degrees; below 0.1 drawn there",
+                                      "KB resident", angle.series)});
+    }
+  }
+}
+
+/// Geometric mean over the models; the line spans the least and the greatest of them.
+std::vector<Bar> bars_over_models(const std::vector<std::pair<std::string, double>>& values) {
+  std::vector<Bar> bars;
+  std::map<std::string, std::size_t> count;
+  for (const auto& [name, value] : values) {
+    if (!(value > 0)) continue;
+    auto it = std::find_if(bars.begin(), bars.end(), [n = name](const Bar& bar) { return bar.name == n; });
+    if (it == bars.end()) it = bars.insert(it, {name, 0, value, value, is_ours(name)});
+    it->value += std::log(value);
+    it->lower = std::min(it->lower, value);
+    it->upper = std::max(it->upper, value);
+    ++count[name];
+  }
+  for (Bar& bar : bars) bar.value = std::exp(bar.value / static_cast<double>(count[bar.name]));
+  std::stable_sort(bars.begin(), bars.end(), [](const Bar& a, const Bar& b) { return a.value < b.value; });
+  return bars;
+}
+
+void add_frames(const Results& results, std::vector<Picture>& pictures) {
+  for (const char* work : {"touching", "far", "grasp"}) {
+    std::vector<std::pair<std::string, double>> values;
+    for (const FrameRow& row : results.frames)
+      if (row.work == work) values.emplace_back(row.peer, row.us.median);
+    if (values.empty()) continue;
+    const std::string title = fmt::format("A frame of the probe, {}: mean over the models", work);
+    pictures.push_back({fmt::format("frames-{}", work), title,
+                        bars_svg(title, "microseconds a frame; line: from the fastest model to the slowest",
+                                 bars_over_models(values))});
+  }
+}
+
+void add_rest(const Results& results, std::vector<Picture>& pictures) {
+  std::vector<std::pair<std::string, double>> memory, jumps, effects;
+  for (const MemoryRow& row : results.memory)
+    if (row.model != "all models")
+      memory.emplace_back(row.is_paper ? "paper: " + row.method : row.method, row.bytes / 1e3);
+  for (const ForceRow& row : results.force) jumps.emplace_back(row.peer, row.mean_change_percent);
+  for (const EffectRow& row : results.effects) effects.emplace_back(row.variant, row.us.median);
+  const auto add = [&](const char* name, const char* title, const char* axis, const auto& values) {
+    if (!values.empty()) pictures.push_back({name, title, bars_svg(title, axis, bars_over_models(values))});
+  };
+  add("memory", "Memory: mean over the models", "KB resident; line: from the least model to the greatest",
+      memory);
+  add("force", "Change of force from step to step of a slide: mean over the models", "% of the mean force",
+      jumps);
+  add("effects", "What a touching frame costs by what it asks for: mean over the models",
+      "microseconds a frame", effects);
+  SeriesByFamily bake;
+  for (const BakeRow& row : results.bake)
+    bake.add(row.model, {row.eq35_percent, row.seconds, row.bytes,
+                         fmt::format("{}: {:.3g} %, {:.3g} s, {:.3g} KB, {} parts", row.model,
+                                     row.eq35_percent, row.seconds, row.bytes / 1e3, row.parts)});
+  if (!bake.series.empty())
+    pictures.push_back({"bake", "What accuracy costs in baking",
+                        scatter_svg("What accuracy costs in baking", "error of the maps (eq. 35), % of R_max",
+                                    "seconds", bake.series)});
+}
+
+}  // namespace
+
+std::vector<Picture> pictures(const Results& results) {
+  std::vector<Picture> all;
+  add_frames(results, all);
+  add_accuracy(results, all);
+  add_rest(results, all);
+  return all;
+}
+
+}  // namespace sqmap::bench

@@ -1,0 +1,123 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+//
+// What a run found: one row type a suite. results.schema.json describes the JSON that it becomes.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "sqmap/asset/result.hpp"
+
+namespace sqmap::bench {
+
+/// Median and quartiles of the repetitions.
+struct Spread {
+  double median{}, lower{}, upper{};
+};
+Spread spread_of(std::vector<double> values);
+
+struct Machine {
+  std::string cpu, kernel, compiler, instruction_set;
+  unsigned cores{};
+  bool is_pinned{};
+};
+
+struct ModelRow {
+  std::string model;
+  std::size_t vertices{}, faces{}, parts{};
+  std::uintmax_t bundle_bytes{};
+  double r_max_m{};
+};
+struct PeerRow {
+  std::string model, peer, family;
+  std::size_t bytes{};
+  double build_s{};
+  double stated_error_percent{};  ///< NaN: none, the method tells contacts only
+  bool stated_is_mean{};
+};
+struct WorkRow {
+  std::string model, work;
+  std::size_t poses{}, probe_points{};
+  double contacts_mean{}, near_mean{}, deepest_percent{}, nearest_percent{};
+};
+struct FrameRow {
+  std::string model, work, peer;
+  double answers_mean{};  ///< points answered, or pairs of triangles, a frame
+  Spread us;              ///< a frame
+  Spread ratio;           ///< to the reference, within each repetition
+};
+struct AccuracyRow {
+  std::string model, peer;
+  double shell_percent{};
+  std::size_t points{};
+  double answered_inside_percent{}, answered_outside_percent{};
+  double mean_error_percent{}, p95_error_percent{},
+      max_error_percent{};      ///< of the answered points, of R_max
+  double wrong_side_percent{};  ///< no answer at all means outside
+  double normal_mean_deg{};     ///< angle to the true gradient, |distance| > 0.1 % of R_max
+  Spread ns;                    ///< a point
+};
+struct MemoryRow {
+  std::string model, method;  ///< method: "DF", "ADF" or "SQ", as in the paper's Table 1, or a peer of ours
+  double bytes{};
+  bool is_paper{};  ///< printed in the paper, for its own model of that name
+};
+struct BakeRow {
+  std::string model, method;
+  double target_percent{};  ///< of eq. (35); NaN for grids
+  double seconds{};
+  double bytes{};
+  double eq35_percent{};  ///< reached; NaN for grids
+  std::size_t parts{};
+};
+struct ForceRow {
+  std::string model, peer;
+  std::size_t steps{};
+  double jumps_percent{};        ///< steps whose force changes by more than 10 % of the mean force
+  double worst_jump_percent{};   ///< of the mean force
+  double mean_change_percent{};  ///< the same, mean over the steps
+  double direction_error_deg{};  ///< mean angle to the gradient of the exact distance
+  double unanswered_percent{};
+};
+struct EffectRow {
+  std::string model, variant;
+  Spread us;  ///< a touching frame
+};
+/// A check of what was measured. All must hold, or the run ends with an error.
+struct CheckRow {
+  std::string model, peer, claim;
+  double found{}, allowed{};
+  bool holds{};
+};
+
+struct Results {
+  std::string command;
+  bool is_smoke{};
+  Machine machine;
+  std::vector<ModelRow> models;
+  std::vector<PeerRow> peers;
+  std::vector<WorkRow> works;
+  std::vector<FrameRow> frames;
+  std::vector<AccuracyRow> accuracy;
+  std::vector<MemoryRow> memory;
+  std::vector<BakeRow> bake;
+  std::vector<ForceRow> force;
+  std::vector<EffectRow> effects;
+  std::vector<CheckRow> checks;
+};
+
+Machine this_machine(bool is_pinned);
+
+std::string results_json(const Results& results);
+std::string results_csv(const Results& results);
+/// The page, and the pictures it shows as files of their own.
+struct Picture {
+  std::string name, title, svg;
+};
+std::vector<Picture> pictures(const Results& results);
+std::string results_page(const Results& results, const std::vector<Picture>& pictures);
+
+}  // namespace sqmap::bench

@@ -1,0 +1,116 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+//
+// Random points around the surface: how wrong each method is, at every setting, and what a point costs.
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include <fmt/format.h>
+
+#include "peer_rows.hpp"
+#include "suites.hpp"
+#include "timing.hpp"
+#include "work.hpp"
+
+namespace sqmap::bench {
+namespace {
+
+constexpr double kNormalFrom = 0.001;  ///< of R_max: closer to the surface a direction is decided by rounding
+
+AccuracyRow compare(const Model& model, const BuiltPeer& built, const Shell& shell, const Cloud& cloud,
+                    Hits& hits) {
+  constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+  built.peer->answer(cloud, {}, hits);
+  const std::size_t count = shell.points_m.size();
+  std::vector<double> told_m(count, kNan);
+  std::vector<Vec3d> normal(count);
+  for (std::size_t i = 0; i < hits.count; ++i) {
+    const std::uint32_t source = cloud.source[hits.point[i]];
+    told_m[source] = hits.distance_m[i];
+    normal[source] = {hits.normal_x[i], hits.normal_y[i], hits.normal_z[i]};
+  }
+  std::vector<std::uint8_t> sides;
+  const bool knows_sides = built.peer->sides(cloud, {}, sides);
+  std::vector<bool> told_inside(count);
+  for (std::size_t i = 0; i < count; ++i)
+    told_inside[cloud.source[i]] = knows_sides ? sides[i] != 0 : told_m[cloud.source[i]] < 0;
+  std::vector<double> errors;
+  std::size_t inside = 0, inside_answered = 0, outside_answered = 0, wrong = 0, angles = 0;
+  double sum = 0, angle_sum_rad = 0;
+  for (std::size_t i = 0; i < count; ++i) {
+    const double truth_m = shell.distance_m[i];
+    const bool is_answered = !std::isnan(told_m[i]);
+    if (truth_m < 0) ++inside;
+    if ((truth_m < 0) != told_inside[i]) ++wrong;
+    if (!is_answered) continue;
+    ++(truth_m < 0 ? inside_answered : outside_answered);
+    errors.push_back(100 * std::abs(told_m[i] - truth_m) / model.r_max_m());
+    sum += errors.back();
+    if (std::abs(truth_m) <= kNormalFrom * model.r_max_m() || !(norm(normal[i]) > 0)) continue;
+    angle_sum_rad += std::atan2(norm(cross(normal[i], shell.normal[i])), dot(normal[i], shell.normal[i]));
+    ++angles;
+  }
+  std::sort(errors.begin(), errors.end());
+  const auto share = [](std::size_t part, std::size_t whole) {
+    return whole == 0 ? kNan : 100 * static_cast<double>(part) / static_cast<double>(whole);
+  };
+  AccuracyRow row;
+  row.model = model.name;
+  row.peer = built.entrant.id;
+  row.shell_percent = 100 * shell.share;
+  row.points = count;
+  row.answered_inside_percent = share(inside_answered, inside);
+  row.answered_outside_percent = share(outside_answered, count - inside);
+  row.mean_error_percent = errors.empty() ? kNan : sum / static_cast<double>(errors.size());
+  row.p95_error_percent = errors.empty() ? kNan : errors[errors.size() * 95 / 100];
+  row.max_error_percent = errors.empty() ? kNan : errors.back();
+  row.wrong_side_percent = share(wrong, count);
+  row.normal_mean_deg =
+      angles == 0 ? kNan : angle_sum_rad / static_cast<double>(angles) * 180 / std::numbers::pi;
+  return row;
+}
+
+void run_shell(const SuiteInput& input, const Model& model, const std::vector<BuiltPeer>& peers, double share,
+               Results& results) {
+  input.note(fmt::format("accuracy: {}, +-{} % shell", model.name, 100 * share));
+  const Shell shell = make_shell(model, share, input.is_smoke ? 2000 : 20000);
+  const Cloud cloud(shell.points_m);
+  Hits hits(cloud.count);
+  std::vector<AccuracyRow> rows;
+  std::vector<Contestant> contestants;
+  for (const BuiltPeer& built : peers) {
+    rows.push_back(compare(model, built, shell, cloud, hits));
+    if (share == kBand) {
+      const AccuracyRow& row = rows.back();
+      const StatedError stated = built.peer->stated_error();
+      const double found = stated.is_mean ? row.mean_error_percent : row.max_error_percent;
+      results.checks.push_back({model.name, built.entrant.id,
+                                fmt::format("{} distance error in the shell, percent of R_max",
+                                            stated.is_mean ? "mean" : "greatest"),
+                                found, stated.percent, found <= stated.percent});
+    }
+    contestants.push_back({built.entrant.id, [&](std::size_t) {
+                             built.peer->answer(cloud, {}, hits);
+                             return hits.count;
+                           }});
+  }
+  const std::vector<Timing> timings = measure(contestants, 1, input.is_smoke ? 3 : 11);
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    rows[i].ns = timings[i].spread(1e9 / static_cast<double>(cloud.count));
+    results.accuracy.push_back(rows[i]);
+  }
+}
+
+}  // namespace
+
+void run_accuracy(const SuiteInput& input, Results& results) {
+  for (const Model& model : input.models) {
+    std::vector<BuiltPeer> peers;
+    for (const Entrant& entrant : accuracy_entrants(model, input.is_smoke))
+      peers.push_back(build_peer(entrant, model, results));
+    for (const double share : {kBand, 0.005}) run_shell(input, model, peers, share, results);
+  }
+}
+
+}  // namespace sqmap::bench

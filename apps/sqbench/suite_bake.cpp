@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+//
+// What preparing an object costs, for each accuracy asked for.
+#include <chrono>
+#include <limits>
+#include <stdexcept>
+
+#include <fmt/format.h>
+
+#include "sqmap/bake/bake.hpp"
+#include "sqmap/io/bundle.hpp"
+
+#include "field.hpp"
+#include "suites.hpp"
+
+namespace sqmap::bench {
+namespace {
+
+double seconds_since(std::chrono::steady_clock::time_point start) {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+}  // namespace
+
+void run_bake(const SuiteInput& input, Results& results) {
+  constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+  const std::vector<double> targets = input.is_smoke ? std::vector{1.0} : std::vector{0.5, 0.2, 0.1, 0.05};
+  for (const Model& model : input.models) {
+    for (const double target : targets) {
+      input.note(fmt::format("bake: {}, {} %", model.name, target));
+      bake::SourceMesh source;
+      source.mesh = model.mesh;
+      source.source_face_count = static_cast<std::uint32_t>(model.mesh.faces.size());
+      source.name = model.name;
+      source.hash = model.asset.provenance.source_hash;
+      bake::BakeOptions options;
+      options.max_error_percent = target;
+      const auto start = std::chrono::steady_clock::now();
+      const auto baked = bake::bake(source, options);
+      if (!baked) throw std::runtime_error("bake " + model.name + ": " + baked.error().finding);
+      const double seconds = seconds_since(start);
+      const auto bytes = io::encode(baked.value().asset);
+      if (!bytes) throw std::runtime_error("encode " + model.name + ": " + bytes.error().finding);
+      double reached = kNan;
+      for (const ErrorRow& row : baked.value().asset.errors)
+        if (row.level == 0 && row.layer == 2) reached = row.eq35_percent;
+      results.bake.push_back({model.name, "sqmap", target, seconds, static_cast<double>(bytes.value().size()),
+                              reached, baked.value().asset.parts.size()});
+    }
+    for (const unsigned resolution : {32U, 64U, 128U}) {
+      const Field field = exact_field(model, resolution);
+      results.bake.push_back({model.name, fmt::format("exact-field-{}", resolution), kNan, field.seconds,
+                              static_cast<double>(field.distance_m.size() * sizeof(float)), kNan, 0});
+    }
+  }
+}
+
+}  // namespace sqmap::bench

@@ -1,0 +1,97 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+//
+// The probe against each object, whole frames: every point of the probe within the band, or all contacts.
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <limits>
+#include <memory>
+
+#include <fmt/format.h>
+
+#include "peer.hpp"
+#include "peer_rows.hpp"
+#include "suites.hpp"
+#include "timing.hpp"
+#include "work.hpp"
+
+namespace sqmap::bench {
+namespace {
+
+constexpr const char* kFclAll = "fcl-obb-all-contacts";
+constexpr const char* kFclFirst = "fcl-obb-first-contact";
+
+/// FCL against every pair of triangles, in one touching pose. A pair that barely touches may go either way.
+void check_contacts(const Model& model, const Probe& probe, const ContactPeer& all,
+                    const Placement& placement, Results& results) {
+  const auto expected = static_cast<double>(count_crossing_pairs(model, probe.mesh, placement));
+  const auto found = static_cast<double>(all.contacts(placement));
+  const double off = 100 * std::abs(found - expected) / std::max(expected, 1.0);
+  results.checks.push_back({model.name, kFclAll, "crossing pairs off the brute-force count, percent", off, 2,
+                            off <= 2 && expected > 0});
+}
+
+void run_model(const SuiteInput& input, const Model& model, Results& results) {
+  const Probe probe = scaled_probe(input.probe, model);
+  std::vector<BuiltPeer> peers;
+  for (const Entrant& entrant : frame_entrants(input.is_smoke))
+    peers.push_back(build_peer(entrant, model, results));
+  const auto start = std::chrono::steady_clock::now();
+  const auto all = make_fcl(model, probe.mesh, false);
+  const double fcl_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  const auto first = make_fcl(model, probe.mesh, true);
+  for (const char* name : {kFclAll, kFclFirst})
+    add_peer_row(
+        {model.name, name, "fcl-obb", all->bytes(), fcl_s, std::numeric_limits<double>::quiet_NaN(), false},
+        results);
+
+  Hits hits(probe.cloud.count);
+  for (const Contact contact : {Contact::kTouching, Contact::kFar, Contact::kGrasp}) {
+    input.note(fmt::format("frames: {}, {}", model.name, name_of(contact)));
+    const Sequence sequence = make_sequence(model, probe, contact, input.is_smoke ? 3 : 24);
+    results.works.push_back({model.name, name_of(contact), sequence.object_from_probe.size(),
+                             probe.cloud.count, sequence.contacts_mean, sequence.near_mean,
+                             sequence.deepest_percent, sequence.nearest_percent});
+    const std::size_t poses = sequence.object_from_probe.size();
+    const bool is_valid =
+        poses > 0 &&
+        (contact == Contact::kFar ? sequence.nearest_percent > 100 * kBand
+                                  : sequence.contacts_mean > 0 && sequence.deepest_percent < 100 * kBand);
+    results.checks.push_back(
+        {model.name, "oracle",
+         fmt::format("{} poses are valid: deepest penetration, percent", name_of(contact)),
+         sequence.deepest_percent, 100 * kBand, is_valid});
+    if (contact == Contact::kTouching && poses > 0)
+      check_contacts(model, probe, *all, sequence.object_from_probe[poses / 2], results);
+    if (contact == Contact::kTouching) {
+      check_frames(model, probe.cloud, sequence.object_from_probe.front(), peers, results);
+    }
+
+    std::vector<Contestant> contestants;
+    for (const BuiltPeer& built : peers)
+      contestants.push_back({built.entrant.id, [&](std::size_t pose) {
+                               built.peer->answer(probe.cloud, sequence.object_from_probe[pose], hits);
+                               return hits.count;
+                             }});
+    for (const auto& [name, peer] : {std::pair{kFclAll, all.get()}, std::pair{kFclFirst, first.get()}})
+      contestants.push_back({name, [&, one = peer](std::size_t pose) {
+                               return one->contacts(sequence.object_from_probe[pose]);
+                             }});
+    const std::vector<Timing> timings = measure(contestants, poses, input.is_smoke ? 3 : 15);
+    const auto reference =
+        static_cast<std::size_t>(std::find_if(contestants.begin(), contestants.end(),
+                                              [](const Contestant& c) { return c.name == kReference; }) -
+                                 contestants.begin());
+    for (std::size_t c = 0; c < contestants.size(); ++c)
+      results.frames.push_back({model.name, name_of(contact), contestants[c].name, timings[c].answers_mean,
+                                timings[c].spread(1e6), timings[c].ratio_to(timings[reference])});
+  }
+}
+
+}  // namespace
+
+void run_frames(const SuiteInput& input, Results& results) {
+  for (const Model& model : input.models) run_model(input, model, results);
+}
+
+}  // namespace sqmap::bench

@@ -1,0 +1,158 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "svg.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+
+#include <fmt/format.h>
+
+namespace sqmap::bench {
+namespace {
+
+constexpr std::array<const char*, 8> kColours{"#c0392b", "#e67e22", "#2471a3", "#17a589",
+                                              "#7d3c98", "#566573", "#b7950b", "#229954"};
+constexpr double kWidth = 860;
+
+std::string opening(double height, const std::string& title) {
+  return fmt::format(
+      "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {0} {1}\" width=\"{0}\" height=\"{1}\" "
+      "font-family=\"sans-serif\" font-size=\"12\">\n<rect width=\"{0}\" height=\"{1}\" fill=\"white\"/>\n"
+      "<text x=\"16\" y=\"22\" font-size=\"15\" font-weight=\"bold\">{2}</text>\n",
+      kWidth, height, escaped(title));
+}
+
+std::string text(double x, double y, const char* anchor, const std::string& words, const char* more = "") {
+  return fmt::format("<text x=\"{:.1f}\" y=\"{:.1f}\" text-anchor=\"{}\" {}>{}</text>\n", x, y, anchor, more,
+                     escaped(words));
+}
+
+/// A logarithmic axis over whole decades.
+struct Axis {
+  double low, high;      // exponents of ten
+  double begin, length;  // on the page; negative length: upwards
+  double at(double value) const { return begin + (std::log10(value) - low) / (high - low) * length; }
+};
+
+Axis axis_over(double least, double most, double begin, double length) {
+  const double low = std::floor(std::log10(least) - 1e-9), high = std::ceil(std::log10(most) + 1e-9);
+  return {low, std::max(high, low + 1), begin, length};
+}
+
+std::string power_of_ten(int exponent) {
+  return exponent >= -4 && exponent <= 4 ? fmt::format("{:g}", std::pow(10.0, exponent))
+                                         : fmt::format("1e{}", exponent);
+}
+
+double disc_radius(double bytes) {
+  return 2 + 1.5 * std::max(0.0, std::log2(std::max(bytes, 1024.0) / 1024));
+}
+
+}  // namespace
+
+std::string escaped(const std::string& words) {
+  std::string out;
+  for (const char c : words)
+    out += c == '<'   ? "&lt;"
+           : c == '>' ? "&gt;"
+           : c == '&' ? "&amp;"
+           : c == '"' ? "&quot;"
+                      : std::string(1, c);
+  return out;
+}
+
+std::string scatter_svg(const std::string& title, const std::string& x_title, const std::string& y_title,
+                        const std::vector<Series>& series) {
+  constexpr double kHeight = 560, kLeft = 80, kRight = 610, kTop = 44, kBottom = 500;
+  double x_low = std::numeric_limits<double>::infinity(), x_high = 0, y_low = x_low, y_high = 0;
+  for (const Series& one : series)
+    for (const Disc& disc : one.discs) {
+      x_low = std::min(x_low, disc.x);
+      x_high = std::max(x_high, disc.x);
+      y_low = std::min(y_low, disc.y);
+      y_high = std::max(y_high, disc.y);
+    }
+  std::string svg = opening(kHeight, title);
+  if (!(x_low > 0) || !(y_low > 0) || !std::isfinite(x_low))
+    return svg + text(kLeft, 60, "start", "no values") + "</svg>\n";
+  const Axis x = axis_over(x_low, x_high, kLeft, kRight - kLeft),
+             y = axis_over(y_low, y_high, kBottom, kTop - kBottom);
+  for (int e = static_cast<int>(x.low); e <= static_cast<int>(x.high); ++e) {
+    const double at = x.at(std::pow(10.0, e));
+    svg += fmt::format("<line x1=\"{0:.1f}\" x2=\"{0:.1f}\" y1=\"{1}\" y2=\"{2}\" stroke=\"#ddd\"/>\n", at,
+                       kTop, kBottom);
+    svg += text(at, kBottom + 18, "middle", power_of_ten(e));
+  }
+  for (int e = static_cast<int>(y.low); e <= static_cast<int>(y.high); ++e) {
+    const double at = y.at(std::pow(10.0, e));
+    svg += fmt::format("<line x1=\"{1}\" x2=\"{2}\" y1=\"{0:.1f}\" y2=\"{0:.1f}\" stroke=\"#ddd\"/>\n", at,
+                       kLeft, kRight);
+    svg += text(kLeft - 8, at + 4, "end", power_of_ten(e));
+  }
+  svg += text((kLeft + kRight) / 2, kBottom + 40, "middle", x_title);
+  svg += text(20, (kTop + kBottom) / 2, "middle", y_title,
+              fmt::format("transform=\"rotate(-90 20 {})\"", (kTop + kBottom) / 2).c_str());
+  double legend = kTop + 12;
+  for (std::size_t i = 0; i < series.size(); ++i) {
+    const char* colour = kColours[i % kColours.size()];
+    std::string line;
+    for (const Disc& disc : series[i].discs)
+      line += fmt::format("{:.1f},{:.1f} ", x.at(disc.x), y.at(disc.y));
+    svg += fmt::format("<polyline points=\"{}\" fill=\"none\" stroke=\"{}\" stroke-opacity=\"0.5\"/>\n", line,
+                       colour);
+    for (const Disc& disc : series[i].discs)
+      svg += fmt::format(
+          "<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"{:.1f}\" fill=\"{}\" fill-opacity=\"0.45\" "
+          "stroke=\"{}\"><title>{}</title></circle>\n",
+          x.at(disc.x), y.at(disc.y), disc_radius(disc.bytes), colour, colour, escaped(disc.label));
+    svg +=
+        fmt::format("<circle cx=\"{}\" cy=\"{}\" r=\"5\" fill=\"{}\"/>\n", kRight + 24, legend - 4, colour);
+    svg += text(kRight + 36, legend, "start", series[i].name);
+    legend += 20;
+  }
+  svg += text(kRight + 18, legend + 16, "start", "size of a disc: memory");
+  legend += 44;
+  for (const auto& [bytes, name] :
+       {std::pair{1024.0 * 64, "64 KB"}, {1024.0 * 1024, "1 MB"}, {1024.0 * 1024 * 16, "16 MB"}}) {
+    const double r = disc_radius(bytes);
+    svg += fmt::format("<circle cx=\"{}\" cy=\"{:.1f}\" r=\"{:.1f}\" fill=\"none\" stroke=\"#555\"/>\n",
+                       kRight + 44, legend + r, r);
+    svg += text(kRight + 80, legend + r + 4, "start", name);
+    legend += 2 * r + 8;
+  }
+  return svg + "</svg>\n";
+}
+
+std::string bars_svg(const std::string& title, const std::string& x_title, const std::vector<Bar>& bars) {
+  constexpr double kLeft = 230, kRight = 780, kTop = 44, kRow = 22;
+  const double bottom = kTop + kRow * static_cast<double>(bars.size());
+  double least = std::numeric_limits<double>::infinity(), most = 0;
+  for (const Bar& bar : bars) {
+    least = std::min(least, bar.lower);
+    most = std::max(most, bar.upper);
+  }
+  std::string svg = opening(bottom + 50, title);
+  if (!(least > 0) || !std::isfinite(least)) return svg + text(kLeft, 60, "start", "no values") + "</svg>\n";
+  const Axis x = axis_over(least, most, kLeft, kRight - kLeft);
+  for (int e = static_cast<int>(x.low); e <= static_cast<int>(x.high); ++e) {
+    const double at = x.at(std::pow(10.0, e));
+    svg += fmt::format("<line x1=\"{0:.1f}\" x2=\"{0:.1f}\" y1=\"{1}\" y2=\"{2}\" stroke=\"#ddd\"/>\n", at,
+                       kTop, bottom);
+    svg += text(at, bottom + 16, "middle", power_of_ten(e));
+  }
+  svg += text((kLeft + kRight) / 2, bottom + 38, "middle", x_title);
+  double y = kTop;
+  for (const Bar& bar : bars) {
+    svg += text(kLeft - 8, y + 15, "end", bar.name, bar.is_ours ? "font-weight=\"bold\"" : "");
+    svg += fmt::format("<rect x=\"{}\" y=\"{:.1f}\" width=\"{:.1f}\" height=\"14\" fill=\"{}\"/>\n", kLeft,
+                       y + 4, std::max(1.0, x.at(bar.value) - kLeft), bar.is_ours ? "#c0392b" : "#7fb3d5");
+    svg += fmt::format("<line x1=\"{:.1f}\" x2=\"{:.1f}\" y1=\"{:.1f}\" y2=\"{:.1f}\" stroke=\"black\"/>\n",
+                       x.at(bar.lower), x.at(bar.upper), y + 11, y + 11);
+    svg += text(x.at(bar.upper) + 6, y + 15, "start", fmt::format("{:.3g}", bar.value));
+    y += kRow;
+  }
+  return svg + "</svg>\n";
+}
+
+}  // namespace sqmap::bench

@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <string>
+#include <vector>
+
+namespace sqmap::bench {
+
+/// One disc of a scatter plot with logarithmic axes; both values must be positive.
+struct Disc {
+  double x{}, y{}, bytes{};  ///< bytes: the disc's radius, on a logarithmic scale from 1 KB on
+  std::string label;         ///< shown when the pointer rests on it
+};
+/// Discs of one colour, joined by a line in their order.
+struct Series {
+  std::string name;
+  std::vector<Disc> discs;
+};
+std::string scatter_svg(const std::string& title, const std::string& x_title, const std::string& y_title,
+                        const std::vector<Series>& series);
+
+/// One bar from zero with its quartiles.
+struct Bar {
+  std::string name;
+  double value{}, lower{}, upper{};
+  bool is_ours{};
+};
+/// Bars over a logarithmic axis, one below the other.
+std::string bars_svg(const std::string& title, const std::string& x_title, const std::vector<Bar>& bars);
+
+/// `text` with the characters that markup reserves written as entities.
+std::string escaped(const std::string& text);
+
+}  // namespace sqmap::bench

@@ -1,0 +1,225 @@
+# SPDX-License-Identifier: Apache-2.0
+"""sqbench: every suite runs, every answer is as close to the truth as its method states, and the results say so in the
+form they promise. No test looks at a time.
+"""
+import csv
+import json
+import os
+import re
+import subprocess
+import sys
+import unittest
+import xml.etree.ElementTree as ET
+from pathlib import Path
+
+from support import ROUGH, FolderTest, box, run, sphere, write_off
+
+ROOT = Path(os.environ["SQMAP_SOURCE_DIR"])
+SCHEMA = ROOT / "apps" / "sqbench" / "results.schema.json"
+COMPARE = ROOT / "scripts" / "bench_compare"
+TYPES = {"object": dict, "array": list, "string": str, "boolean": bool, "null": type(None)}
+
+
+def is_a(value, name):
+    if name in ("number", "integer"):
+        return isinstance(value, (int, float) if name == "number" else int) and not isinstance(value, bool)
+    return isinstance(value, TYPES[name])
+
+
+def violations(value, schema, root, where="$"):
+    """What breaks the schema; of JSON Schema as much as results.schema.json uses."""
+    if "$ref" in schema:
+        schema = {**root["$defs"][schema["$ref"].rsplit("/", 1)[1]], **schema}
+    if "const" in schema and value != schema["const"]:
+        yield f"{where}: {value!r}, must be {schema['const']!r}"
+    if "enum" in schema and value not in schema["enum"]:
+        yield f"{where}: {value!r}, must be one of {schema['enum']}"
+    names = schema.get("type", [])
+    names = [names] if isinstance(names, str) else names
+    if names and not any(is_a(value, name) for name in names):
+        yield f"{where}: {value!r}, must be {names}"
+        return
+    if "minimum" in schema and value < schema["minimum"]:
+        yield f"{where}: {value!r}, must be at least {schema['minimum']}"
+    if isinstance(value, list):
+        for index, item in enumerate(value):
+            yield from violations(item, schema["items"], root, f"{where}[{index}]")
+    if isinstance(value, dict):
+        for name in set(schema["required"]) - value.keys():
+            yield f"{where}: no {name}"
+        for name, item in value.items():
+            if name in schema["properties"]:
+                yield from violations(item, schema["properties"][name], root, f"{where}.{name}")
+            else:
+                yield f"{where}: {name} is not in the schema"
+
+
+class Smoke(FolderTest):
+    """One smoke run over a sphere and a box, baked here; the probe is a sphere."""
+
+    results = None
+    files = None
+
+    def setUp(self):
+        super().setUp()
+        if Smoke.results is not None:
+            return
+        out = self.folder / "out"
+        meshes = []
+        for name, mesh in (("ball", sphere(4, 1.0)), ("brick", box(2, 1, 1))):
+            self.bake(mesh, name, *ROUGH)
+            meshes.append(self.folder / f"{name}.off")
+        probe = write_off(self.folder / "probe.off", sphere(3, 0.3))
+        done = run("sqbench", "run", "all", "--smoke", "--meshes", *meshes, "--bundles", self.folder, "--probe", probe,
+                   "-o", out)
+        self.assert_exit(done, 0)
+        Smoke.files = {path.name: path.read_text(encoding="utf-8") for path in out.iterdir()}
+        Smoke.results = json.loads(Smoke.files["results.json"])
+
+    def rows(self, table, **wanted):
+        return [row for row in self.results[table] if all(row[key] == value for key, value in wanted.items())]
+
+    def test_results_fit_the_schema_that_is_shipped(self):
+        schema = json.loads(SCHEMA.read_text(encoding="utf-8"))
+        self.assertEqual(list(violations(self.results, schema, schema)), [])
+        broken = json.loads(json.dumps(self.results))
+        broken["frames"][0]["us"]["median"] = "fast"
+        del broken["machine"]["cpu"]
+        self.assertEqual(len(list(violations(broken, schema, schema))), 2)
+
+    def test_every_suite_has_rows_for_every_object(self):
+        for table in ("peers", "works", "frames", "accuracy", "bake", "force", "effects", "checks"):
+            with self.subTest(table=table):
+                self.assertLessEqual({"ball", "brick"}, {row["model"] for row in self.results[table]})
+        self.assertEqual({row["work"] for row in self.results["frames"]}, {"touching", "far", "grasp"})
+        self.assertEqual({row["shell_percent"] for row in self.results["accuracy"]}, {0.5, 3.0})
+
+    def test_every_peer_answers_within_the_error_it_states(self):
+        self.assertTrue(all(check["holds"] for check in self.results["checks"]))
+        checked = {check["peer"] for check in self.results["checks"]}
+        self.assertLessEqual({row["peer"] for row in self.results["accuracy"]}, checked)
+        self.assertIn("fcl-obb-all-contacts", checked)
+
+    def test_grids_answer_every_point_of_the_shells(self):
+        for row in self.rows("accuracy"):
+            if "128" in row["peer"]:
+                self.assertGreater(row["answered_inside_percent"], 99.9, row)
+                self.assertGreater(row["answered_outside_percent"], 98, row)
+
+    def test_error_of_a_grid_falls_with_its_spacing_and_that_of_exact_peers_is_none(self):
+        for family in ("grid-float-{}-simd", "grid-int16-{}-simd", "bricks-8bit-{}-simd"):
+            coarse, fine = (self.rows("accuracy", model="brick", shell_percent=3.0, peer=family.format(n))[0]
+                            for n in (32, 128))
+            self.assertLess(fine["mean_error_percent"], 0.5 * coarse["mean_error_percent"])
+            self.assertLess(fine["normal_mean_deg"], coarse["normal_mean_deg"])
+        for peer in ("embree-closest", "cgal-closest"):
+            for row in self.rows("accuracy", peer=peer):
+                self.assertLess(row["max_error_percent"], 1e-4)
+                self.assertEqual(row["wrong_side_percent"], 0)
+                self.assertLess(row["normal_mean_deg"], 0.5)
+
+    def test_scalar_vector_and_culled_grids_give_the_same_answers(self):
+        for row in self.rows("frames", peer="grid-int16-128-simd"):
+            for other in ("grid-int16-128-simd-culled", "grid-float-128-simd", "grid-float-128-scalar"):
+                twin = self.rows("frames", peer=other, model=row["model"], work=row["work"])[0]
+                # Codes of 16 bits round: points on the rim of the band may fall to either side.
+                self.assertAlmostEqual(twin["answers_mean"], row["answers_mean"],
+                                       delta=0 if "culled" in other else 1 + 0.01 * row["answers_mean"])
+
+    def test_poses_do_what_their_names_say(self):
+        for row in self.results["works"]:
+            with self.subTest(model=row["model"], work=row["work"]):
+                self.assertEqual(row["contacts_mean"] > 0, row["work"] != "far")
+                self.assertLess(row["deepest_percent"], 3)
+                if row["work"] == "far":
+                    self.assertEqual(row["near_mean"], 0)
+        for row in self.rows("frames", work="far"):
+            self.assertEqual(row["answers_mean"], 0, row)
+        for row in self.rows("frames", peer="embree-closest"):
+            work = self.rows("works", model=row["model"], work=row["work"])[0]
+            self.assertAlmostEqual(row["answers_mean"], work["near_mean"], delta=0.5)
+
+    def test_reference_has_ratio_one_and_spreads_are_ordered(self):
+        for row in self.results["frames"]:
+            self.assertTrue(0 < row["us"]["lower"] <= row["us"]["median"] <= row["us"]["upper"])
+            if row["peer"] == "grid-int16-128-simd":
+                self.assertEqual(row["ratio"], {"median": 1, "lower": 1, "upper": 1})
+
+    def test_memory_is_that_of_the_arrays(self):
+        peer = {row["peer"]: row for row in self.rows("peers", model="ball")}
+        nodes = 128 ** 3  # the ball's box is a cube
+        self.assertAlmostEqual(peer["grid-float-128-simd"]["bytes"], 4 * nodes, delta=1000)
+        self.assertAlmostEqual(peer["grid-int16-128-simd"]["bytes"], 2 * nodes, delta=1000)
+        self.assertLess(peer["bricks-8bit-128-simd"]["bytes"], nodes)
+        elephant = {row["method"]: row["bytes"] for row in self.rows("memory", model="Elephant", is_paper=True)}
+        self.assertEqual(elephant, {"DF": 417e6, "ADF": 68e6, "SQ": 5.1e6})
+
+    def test_every_picture_draws_its_values_and_stands_on_the_page(self):
+        pictures = {name: text for name, text in self.files.items() if name.endswith(".svg")}
+        self.assertGreaterEqual(len(pictures), 11)
+        for name, text in pictures.items():
+            with self.subTest(name=name):
+                ET.fromstring(text)
+                shapes = re.findall(r"<(?:rect|circle)[^>]*(?:width|r)=\"([\d.]+)\"", text)
+                self.assertGreater(len([s for s in shapes if float(s) > 0]), 5)
+                self.assertNotIn("nan", text.lower())
+                self.assertNotIn("no values", text)
+                self.assertIn(text, self.files["index.html"])
+
+    def test_page_stands_alone_and_says_in_words_where_sqmap_loses(self):
+        page = self.files["index.html"]
+        self.assertNotRegex(page, r"<script|src=|href=\"(?!data:)")
+        self.assertIn("Near contact (+-0.5 % shell)", page)
+        self.assertRegex(page, r"(wins against|loses to) that grid")
+
+    def test_csv_holds_the_numbers_of_the_json(self):
+        table = list(csv.DictReader(self.files["results.csv"].splitlines()))
+        rows = {(r["table"], r["model"], r["work"], r["peer"], r["quantity"]): r["value"] for r in table}
+        row = self.rows("frames", model="ball", work="grasp", peer="cgal-closest")[0]
+        self.assertEqual(float(rows["frames", "ball", "grasp", "cgal-closest", "us.median"]), row["us"]["median"])
+        self.assertEqual(len({r["table"] for r in table}), 10)
+
+    def test_compare_finds_a_slower_frame_and_only_that(self):
+        before, after = self.folder / "a.json", self.folder / "b.json"
+        slower = json.loads(self.files["results.json"])
+        for key in ("median", "lower", "upper"):
+            slower["frames"][0]["us"][key] *= 10
+        before.write_text(self.files["results.json"], encoding="utf-8")
+        after.write_text(json.dumps(slower), encoding="utf-8")
+
+        def compare(*files):
+            return subprocess.run([sys.executable, "-B", COMPARE, *files], capture_output=True, text=True, check=False)
+
+        same, worse, better = compare(before, before), compare(before, after), compare(after, before)
+        self.assertEqual((same.returncode, worse.returncode, better.returncode), (0, 1, 0))
+        self.assertEqual(worse.stdout.count(" slower"), 1)
+        self.assertIn("10.000", worse.stdout)
+        self.assertEqual(better.stdout.count(" faster"), 1)
+        self.assertEqual(compare(before, COMPARE).returncode, 4)
+
+
+class Refusals(FolderTest):
+    def test_bundle_of_another_mesh_is_refused(self):
+        self.bake(sphere(2), "ball", *ROUGH)
+        mesh = write_off(self.folder / "ball.off", box())
+        result = run("sqbench", "run", "memory", "--smoke", "--meshes", mesh, "--bundles", self.folder, "--probe", mesh,
+                     "-o", self.folder / "out")
+        self.assert_exit(result, 2)
+        self.assertIn("hashes", result.stderr)
+        self.assertFalse((self.folder / "out").exists())
+
+    def test_missing_files_and_unknown_suites_are_refused(self):
+        mesh = write_off(self.folder / "ball.off", sphere(1))
+        for arguments, code, words in (
+                (("speed",), 2, "speed"),
+                (("memory", "--meshes", self.folder / "none.off", "--probe", mesh), 3, "none"),
+                (("memory", "--meshes", mesh, "--probe", self.folder / "none.off"), 3, "none.off"),
+                (("memory", "--meshes", mesh, "--probe", mesh, "--bundles", self.folder), 3, "ball.h5")):
+            with self.subTest(arguments=arguments):
+                result = run("sqbench", "run", *arguments, "-o", self.folder / "out")
+                self.assert_exit(result, code)
+                self.assertIn(words, result.stderr)
+
+
+if __name__ == "__main__":
+    unittest.main()
