@@ -182,7 +182,11 @@ std::vector<ErrorRow> measure(const Asset& asset, const runtime::Object& object,
       std::vector<double> errors;
       for (std::size_t i = 0; i < of_wide.signed_distance_m.size(); ++i) {
         const double told_m = of_wide.signed_distance_m[i];
-        if (!std::isnan(told_m)) errors.push_back(std::abs(told_m - wide.signed_distance_m[i]));
+        if (!std::isnan(told_m)) {
+          errors.push_back(std::abs(told_m - wide.signed_distance_m[i]));
+        } else if (layer > 1 && wide.signed_distance_m[i] < 0) {
+          errors.push_back(-wide.signed_distance_m[i]);  // an inner point told no distance feels no force
+        }
       }
       std::sort(errors.begin(), errors.end());
       double sum = 0;

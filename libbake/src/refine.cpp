@@ -19,10 +19,12 @@ namespace {
 constexpr std::uint32_t kDraftQuadrantCells = 32;
 constexpr std::uint32_t kShellPoints = 4000;
 // Half width of the shell the partition is judged in, and the cap of one point's error, as shares of R_max.
-constexpr double kShellWidth = 0.01;
+constexpr double kShellWidth = 0.03;
 constexpr double kWorstError = 0.02;
 // Parts with at least this share of the worst part's error are split in the same round.
 constexpr double kRoundShare = 0.7;
+// The final maps are coarser than the drafts that pieces are judged by, and take the rest of the target.
+constexpr double kRefineShare = 0.7;
 // A split pays if it lowers the error by more than this share of what each part of a full count may err.
 constexpr double kPartPrice = 0.3;
 
@@ -109,7 +111,7 @@ class Refiner {
         queries_(queries),
         r_max_m_(r_max_m),
         options_(options),
-        target_m_(kShellPoints * options.max_error_percent / 100 * r_max_m),
+        target_m_(kRefineShare * kShellPoints * options.max_error_percent / 100 * r_max_m),
         shell_(sample_shell(queries, kShellWidth * r_max_m, kShellPoints, options.seed)) {}
 
   Outcome start(std::vector<Cell> cells) {

@@ -43,6 +43,8 @@ inline constexpr int kThirdLayerSteps =
 inline constexpr float kLeastAngle =
     1e-6F;  ///< squared sine between rows and columns, below which one is a pole
 inline constexpr float kLeastCellStep = 1e-3F;  ///< cells: shorter steps end the search
+inline constexpr int kStartRings =
+    5;  ///< rings of cells, at doubling distances, in which layer 3 looks for a patch to start from
 
 /// Layer 1: F(p) <= 1 (FORMAT.md S1), from powers of the unit coordinates.
 inline bool in_superquadric(const PartRecord& part, const Vec3f& p) noexcept {
@@ -87,6 +89,10 @@ class Chart {
   bool vertex_fan_at(const Vec3f& p, float row, float col, ChartAnswer& answer) const noexcept {
     return vertex_fan(p, cell_at(row, col, 1), answer);
   }
+  /// Where layer 3 starts when the foot's own cell bounds no patch (beside a seam or a silhouette): the
+  /// centre of the nearest cell that does, of those in eight directions on the first ring that has any.
+  /// False: none.
+  bool patch_beside(const Vec3f& p, std::uint32_t level, float& row, float& col) const noexcept;
   /// delta of QueryOptions::edge_length_m at a place of the map.
   float offset(float row, float col, std::uint32_t level, float edge) const noexcept;
 
@@ -117,8 +123,8 @@ class Chart {
     return r.point_m - depth * r.normal;
   }
   ChartAnswer second_layer(const Foot<float>& foot, std::uint32_t stride) const noexcept;
-  void third_layer(const Vec3f& p, const Foot<float>& foot, std::uint32_t stride,
-                   ChartAnswer& answer) const noexcept;
+  /// From (answer.row, answer.col), whose cell bounds a patch.
+  void third_layer(const Vec3f& p, std::uint32_t stride, ChartAnswer& answer) const noexcept;
   bool vertex_fan(const Vec3f& p, const Cell& cell, ChartAnswer& answer) const noexcept;
   /// Largest convex curvature of the represented surface around (row, col), at the resolution of the cells; 0
   /// where it is flat or hollow.
@@ -171,7 +177,11 @@ inline ChartAnswer Chart::look(const Vec3f& p, bool third, std::uint32_t level, 
   ChartAnswer answer = second_layer(foot, stride);
   if (third) {
     ChartAnswer refined = answer;
-    third_layer(p, foot, stride, refined);
+    // An inner point needs a distance, or it would feel no force.
+    if (std::isfinite(answer.distance) ||
+        (answer.inside && patch_beside(p, level, refined.row, refined.col))) {
+      third_layer(p, stride, refined);
+    }
     // A second sheet behind the first has no patch of its own: its ray distance stands where it is nearer.
     if (!answer.behind_first || refined.distance < answer.distance) answer = refined;
   }
@@ -270,11 +280,38 @@ inline ChartAnswer Chart::second_layer(const Foot<float>& foot, std::uint32_t st
   return answer;
 }
 
-inline void Chart::third_layer(const Vec3f& p, const Foot<float>& foot, std::uint32_t stride,
-                               ChartAnswer& answer) const noexcept {
-  float row = foot.row, col = foot.col;
+inline bool Chart::patch_beside(const Vec3f& p, std::uint32_t level, float& row, float& col) const noexcept {
+  const std::uint32_t stride = part_.stride_at(level);
+  const auto turn = static_cast<float>(part_.cols);
+  const float half = static_cast<float>(stride) / 2, last = static_cast<float>(part_.rows - 1) - half;
+  const Cell foot_cell = cell_at(row, col, stride);
+  const float mid_row = static_cast<float>(foot_cell.row) + half,
+              mid_col = static_cast<float>(foot_cell.col) + half;
+  float best_square = std::numeric_limits<float>::infinity();
+  for (int ring = 0; ring < kStartRings && !std::isfinite(best_square); ++ring) {
+    const auto step = static_cast<float>(stride << ring);
+    for (int k = 0; k < 9; ++k) {
+      const float here_row = mid_row + static_cast<float>(k / 3 - 1) * step;
+      float here_col = mid_col + static_cast<float>(k % 3 - 1) * step;
+      if (here_row < half || here_row > last) continue;
+      here_col = here_col < 0 ? here_col + turn : here_col;
+      here_col = here_col < turn ? here_col : here_col - turn;
+      if (!(here_col >= 0 && here_col < turn)) continue;  // a ring wider than the map
+      const Cell cell = cell_at(here_row, here_col, stride);
+      if (!cell.eligible) continue;
+      const Vec3f d = p - patch_at(cell, here_row, here_col, stride).point;
+      if (!(dot(d, d) < best_square)) continue;
+      best_square = dot(d, d);
+      row = here_row;
+      col = here_col;
+    }
+  }
+  return std::isfinite(best_square);
+}
+
+inline void Chart::third_layer(const Vec3f& p, std::uint32_t stride, ChartAnswer& answer) const noexcept {
+  float row = answer.row, col = answer.col;
   Cell cell = cell_at(row, col, stride);
-  if (!cell.eligible) return;
   const auto last_row = static_cast<float>(part_.rows - 1), turn = static_cast<float>(part_.cols);
   const auto most_row = static_cast<float>(stride);
   const float last_col = std::nextafter(turn, 0.0F);

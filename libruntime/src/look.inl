@@ -31,6 +31,7 @@ class Looker {
       : resident_(resident),
         part_(part),
         chart_(chart),
+        level_(level),
         stride_(part.stride_at(level)),
         last_row_(static_cast<float>(part.rows - 1)),
         turn_(static_cast<float>(part.cols)),
@@ -42,9 +43,11 @@ class Looker {
     M behind;
     Look second = second_layer(foot, wanted, third, wants, behind);
     if (!third) return second;
-    const M eligible = hn::And(wanted, hn::Lt(second.distance, all(std::numeric_limits<float>::infinity())));
+    M eligible = hn::And(wanted, hn::Lt(second.distance, all(std::numeric_limits<float>::infinity())));
+    const M lost = hn::AndNot(eligible, hn::And(wanted, second.inside));
+    if (!none(lost)) eligible = hn::Or(eligible, start_beside(lost, p, second));
     if (none(eligible)) return second;
-    const Look refined = third_layer(p, foot, eligible, wants);
+    const Look refined = third_layer(p, second.row, second.col, eligible, wants);
     const M better =
         hn::And(eligible, hn::Not(hn::AndNot(hn::Lt(refined.distance, second.distance), behind)));
     second.distance = pick(better, refined.distance, second.distance);
@@ -122,7 +125,8 @@ class Looker {
 
   SQMAP_KERNEL Look second_layer(const VFoot& foot, M wanted, bool third, const Wants& wants,
                                  M& behind) const noexcept;
-  HWY_NOINLINE Look third_layer(const V3& p, const VFoot& foot, M active, const Wants& wants) const noexcept;
+  HWY_NOINLINE M start_beside(M lanes, const V3& p, Look& look) const noexcept;
+  HWY_NOINLINE Look third_layer(const V3& p, V row, V col, M active, const Wants& wants) const noexcept;
   HWY_NOINLINE void further_sheets(M lanes, VI texel, V shift, V depth, V& gap, V& crossing, V& inside,
                                    V& leaving, V& later) const noexcept;
   HWY_NOINLINE void vertex_fans(M lanes, const V3& p, const VCell& cell, Look& look) const noexcept;
@@ -130,7 +134,7 @@ class Looker {
   const Resident& resident_;
   const PartRecord& part_;
   const Chart& chart_;
-  std::uint32_t stride_;
+  std::uint32_t level_, stride_;
   float last_row_, turn_, size_, inverse_size_;
 };
 
@@ -239,11 +243,29 @@ HWY_NOINLINE void Looker::further_sheets(M lanes, VI texel, V shift, V depth, V&
   later = hn::Load(kD, laters);
 }
 
-HWY_NOINLINE Look Looker::third_layer(const V3& p, const VFoot& foot, M active,
+/// Chart::patch_beside for some lanes: those that found a patch, and its place in `look`.
+HWY_NOINLINE M Looker::start_beside(M lanes, const V3& p, Look& look) const noexcept {
+  HWY_ALIGN float wanted[kMostLanes], x[kMostLanes], y[kMostLanes], z[kMostLanes], row[kMostLanes],
+      col[kMostLanes];
+  hn::Store(hn::IfThenElseZero(lanes, all(1.0F)), kD, wanted);
+  hn::Store(p.x, kD, x);
+  hn::Store(p.y, kD, y);
+  hn::Store(p.z, kD, z);
+  hn::Store(look.row, kD, row);
+  hn::Store(look.col, kD, col);
+  for (std::uint32_t lane = 0; lane < lane_count(); ++lane) {
+    if (wanted[lane] > 0 && !chart_.patch_beside({x[lane], y[lane], z[lane]}, level_, row[lane], col[lane]))
+      wanted[lane] = 0;
+  }
+  look.row = hn::Load(kD, row);
+  look.col = hn::Load(kD, col);
+  return hn::Gt(hn::Load(kD, wanted), hn::Zero(kD));
+}
+
+HWY_NOINLINE Look Looker::third_layer(const V3& p, V row, V col, M active,
                                       const Wants& wants) const noexcept {
   const V zero = hn::Zero(kD), one = all(1.0F);
   const M asked = active;
-  V row = foot.row, col = foot.col;
   VCell cell = cell_at(row, col);
   read(cell);
   const V last_row = all(last_row_), turn = all(turn_), most_row = all(size_);

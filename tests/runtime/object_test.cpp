@@ -191,6 +191,28 @@ TEST(Object, CrossingASeamKeepsTheDepth) {
   EXPECT_LE(off, counted / 100) << "depth jumps at the seam";
 }
 
+TEST(Object, InnerPointsHaveADistanceEvenBesideASeam) {
+  // The hole that the seam leaves in both maps: the feet of points between the balls lie inside the mesh.
+  const std::vector<test::Ball> balls{{{-0.5, 0, 0}, 0.8}, {{0.5, 0, 0}, 0.8}};
+  const Object object = built(test::two_balls(balls, 65, 128));
+  std::mt19937 rng(11);
+  std::uniform_real_distribution<double> share(-1, 1);
+  int inner = 0;
+  for (int i = 0; i < 20000; ++i) {
+    const Vec3d p_m{1.3 * share(rng), 0.8 * share(rng), 0.8 * share(rng)};
+    const Answer answer = object.query(cast<float>(p_m), {Layer::kThree, 0});
+    if (!answer.inside) continue;
+    ++inner;
+    ASSERT_TRUE(std::isfinite(answer.signed_distance_m)) << p_m.x << ' ' << p_m.y << ' ' << p_m.z;
+    // The surface it speaks of is the mesh's: on one ball and not inside the other.
+    double nearest_m = 10;
+    for (const auto& ball : balls)
+      nearest_m = std::min(nearest_m, norm(cast<double>(answer.surface_m) - ball.centre_m) - ball.radius_m);
+    EXPECT_NEAR(nearest_m, 0, 0.02);
+  }
+  EXPECT_GT(inner, 5000);
+}
+
 TEST(Object, OffsetKeepsFacesOutThatTheirCornersMiss) {
   const Object object = built(test::ball_in_ellipsoid(kRadius, 65, 128));
   constexpr float kEdge = 0.4F;

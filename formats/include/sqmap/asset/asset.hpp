@@ -38,15 +38,17 @@ struct Part {
 /// R_max. A value that could not be measured (no samples) is NaN.
 struct ErrorRow {
   std::uint32_t level{};
-  std::uint32_t layer{};              ///< 1, 2 or 3
-  double eq35_percent{};              ///< mean |D_hat - D| / R_max over shell points inside a superquadric
-  double depth_mean_percent{};        ///< mean |signed distance error|, +-3 % shell, inside a superquadric
+  std::uint32_t layer{};  ///< 1, 2 or 3
+  double eq35_percent{};  ///< mean |D_hat - D| / R_max over shell points inside a superquadric
+  /// Mean |signed distance error| in the +-3 % shell, where a distance is told; inner points without one
+  /// count with their whole depth.
+  double depth_mean_percent{};
   double depth_p95_percent{};         ///< 95th percentile of the same
   double misclassified_3_percent{};   ///< share of wrong inside/outside answers, +-3 % shell
   double misclassified_05_percent{};  ///< the same in the +-0.5 % shell
   std::uint32_t samples_3{};          ///< points of the +-3 % shell
   std::uint32_t samples_05{};         ///< points of the +-0.5 % shell
-  std::uint32_t samples_depth{};      ///< of samples_3, those with a distance
+  std::uint32_t samples_depth{};      ///< of samples_3, those that depth_mean is over
 };
 
 /// Where an asset comes from.
