@@ -21,7 +21,7 @@ class Containment(FolderTest):
         return subprocess.run([PYTHON, SCRIPT, bundle, mesh], capture_output=True, text=True, timeout=TIMEOUT_S,
                               check=False)
 
-    def test_every_vertex_is_inside_the_superquadrics_of_its_parts(self):
+    def test_every_vertex_and_surface_point_is_inside_a_superquadric(self):
         bundle = self.bake(self.bent(3), "bent", "--unit", "cm", "--up", "y", "--max-parts", "6")
         result = self.check(bundle, self.folder / "bent.off")
         self.assertEqual(result.returncode, 0, result.stdout + result.stderr)
