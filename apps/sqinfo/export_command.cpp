@@ -102,11 +102,11 @@ Outcome export_maps(const Asset& asset, const ExportArguments& arguments) {
   for (std::size_t i = 0; i < asset.parts.size(); ++i) {
     const DistanceMap& map = asset.parts[i].map;
     const MapStatistics range = statistics(map);
-    Result<std::vector<std::uint8_t>> png =
+    const Result<std::vector<std::uint8_t>> png =
         map_png(map, arguments.map_level, range.depth_least_m, range.depth_most_m);
     if (!png) return png.error();
     const std::string name = fmt::format("part_{:02}.png", i);
-    if (const Outcome written = write_file(arguments.maps / name, png.value()); !written) return written;
+    if (Outcome written = write_file(arguments.maps / name, png.value()); !written) return written;
     legend["maps"].push_back({{"file", name},
                               {"part", i},
                               {"level", std::min(arguments.map_level, map.level_count - 1)},

@@ -11,8 +11,8 @@
 
 namespace sqmap::runtime {
 
-// How many times as certain as the chart of the nearest surface another chart must be to decide the side. Chosen
-// on the sample meshes, where larger values change little.
+// How many times as certain as the chart of the nearest surface another chart must be to decide the side.
+// Chosen on the sample meshes, where larger values change little.
 inline constexpr float kOverrule = 4;
 
 inline Layer layer_for(const PartRecord& part, const QueryOptions& options) noexcept {

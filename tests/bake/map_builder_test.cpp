@@ -47,7 +47,7 @@ TEST(TraceMap, ReachEndsAtTheMedialAxisOfABox) {
   // height below.
   const Scene scene(test::sphere(0.3, 3));
   const RayField field = trace_map({{2, 2, 0.5}, 0.1, 0.1}, {}, 33, 64, scene.queries());
-  EXPECT_NEAR(field.reach_m[32 * 64], 0.5, 0.01);
+  EXPECT_NEAR(field.reach_m[std::size_t{32} * 64], 0.5, 0.01);
 }
 
 TEST(TraceMap, TexelsInsideTheMeshSaySo) {

@@ -203,7 +203,9 @@ TEST_F(MeshIo, PlyReadsTextAndBothByteOrders) {
       append(std::int16_t{-9});
     }
     const std::string format = is_big ? "binary_big_endian" : "binary_little_endian";
-    const Mesh mesh = read(format + ".ply", "ply\nformat " + format + header + data).mesh;
+    std::string file = "ply\nformat ";
+    file.append(format).append(header).append(data);
+    const Mesh mesh = read(format + ".ply", file).mesh;
     EXPECT_EQ(mesh.vertices_m, text.mesh.vertices_m);
     EXPECT_EQ(mesh.faces, text.mesh.faces);
   }

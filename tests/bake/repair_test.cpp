@@ -154,7 +154,7 @@ TEST(Repair, TurnsASolidWithinACavityOutwards) {
 TEST(Repair, DropsCopiesOfFacesInEitherDirection) {
   Mesh mesh = test::sphere(1, 2);
   for (std::uint32_t f = 0; f < 10; ++f) {
-    auto copy = mesh.faces[7 * f];
+    auto copy = mesh.faces[std::size_t{7} * f];
     std::rotate(copy.begin(), copy.begin() + 1, copy.end());
     if (f % 2 == 0) std::swap(copy[0], copy[1]);
     mesh.faces.push_back(copy);
