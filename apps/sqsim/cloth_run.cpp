@@ -84,7 +84,7 @@ Outcome run_cloth(Console& console, const LoadedScene& loaded, const RunOptions&
   using Clock = std::chrono::steady_clock;
   const ClothEntry& entry = *loaded.file.cloth;
   Obstacles obstacles;
-  if (const Outcome ok = build(loaded, obstacles); !ok) return ok;
+  if (Outcome ok = build(loaded, obstacles); !ok) return ok;
   Cloth cloth(entry);
   obstacles.distance_m.resize(cloth.nodes_m().size());
   obstacles.normal.resize(cloth.nodes_m().size());
@@ -122,9 +122,8 @@ Outcome run_cloth(Console& console, const LoadedScene& loaded, const RunOptions&
   console.out(
       fmt::format("last frame: {} of {} nodes in contact\n", rows.back().contacts, cloth.nodes_m().size()));
   if (options.output.empty()) return Done{};
-  if (const Outcome ok = write_file(options.output / "trace.csv", trace_csv(rows)); !ok) return ok;
-  if (const Outcome ok = write_file(options.output / "trace.svg", trace_svg(rows, "sqsim: cloth")); !ok)
-    return ok;
+  if (Outcome ok = write_file(options.output / "trace.csv", trace_csv(rows)); !ok) return ok;
+  if (Outcome ok = write_file(options.output / "trace.svg", trace_svg(rows, "sqsim: cloth")); !ok) return ok;
   const auto glb = picture_glb(loaded.objects, "cloth", cloth.surface());
   if (!glb) return glb.error();
   return write_file(options.output / "last_frame.glb", glb.value());

@@ -22,8 +22,8 @@ namespace {
 
 Outcome write_outputs(const LoadedScene& scene, const std::vector<TraceRow>& rows,
                       const std::filesystem::path& folder) {
-  if (const Outcome ok = write_file(folder / "trace.csv", trace_csv(rows)); !ok) return ok;
-  if (const Outcome ok = write_file(folder / "trace.svg", trace_svg(rows, "sqsim: probe")); !ok) return ok;
+  if (Outcome ok = write_file(folder / "trace.csv", trace_csv(rows)); !ok) return ok;
+  if (Outcome ok = write_file(folder / "trace.svg", trace_svg(rows, "sqsim: probe")); !ok) return ok;
   const auto glb = picture_glb(scene.objects, "probe", moved(scene.probe, rows.back().pose));
   if (!glb) return glb.error();
   return write_file(folder / "last_frame.glb", glb.value());

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 #include <tbb/parallel_for.h>
@@ -26,6 +27,17 @@ namespace {
 
 // Vertex samples are kept where the surface misses the vertex by this multiple of the error target.
 constexpr double kVertexTolerance = 2;
+// Shell that finished maps are judged in: points, half width, and cap of one point's error as shares of
+// R_max.
+constexpr std::uint32_t kShellPoints = 4000;
+constexpr double kShellWidth = 0.03;
+constexpr double kWorstError = 0.02;
+// Maps are drawn at most so often, each time for this share of the target before, while that takes a fourth
+// off the error and the error exceeds the target by a tenth.
+constexpr int kMapRounds = 4;
+constexpr double kStricter = 0.4;
+constexpr double kWorthFinerMaps = 0.75;
+constexpr double kNearTarget = 1.1;
 // Parts take whole triangles. So that long ones do not tie together what should be cut, edges are halved down
 // to this share of R_max first, as far as the number of added triangles allows.
 constexpr double kLongestEdge = 1.0 / 16;
@@ -185,6 +197,34 @@ std::vector<std::uint16_t> label_input_faces(const std::vector<std::uint16_t>& o
   return labels;
 }
 
+/// The maps that the target asks for. What they lose beside seams, where one chart ends and the next has not
+/// begun, shows only between parts: as long as the error of the whole exceeds the target, and finer maps
+/// lower it, they are drawn for a stricter one. True: the byte budget decided.
+Result<bool> draw_maps(Asset& asset, const std::vector<double>& areas_m2, const MeshQueries& queries,
+                       const MapTarget& target, std::uint64_t seed) {
+  const ShellPoints shell = sample_shell(queries, kShellWidth * asset.r_max_m, kShellPoints, seed);
+  std::vector<Part> best;
+  double least_m = std::numeric_limits<double>::infinity();
+  bool by_budget = false;
+  MapTarget stricter = target;
+  for (int round = 0; round < kMapRounds; ++round, stricter.error_m *= kStricter) {
+    const bool budget_decided = map_parts(asset.parts, areas_m2, queries, stricter);
+    tbb::parallel_for(std::size_t{0}, asset.parts.size(), [&](std::size_t k) {
+      add_vertex_samples(asset.parts[k], queries, kVertexTolerance * target.error_m);
+    });
+    auto object = runtime::Object::build(asset);
+    if (!object) return object.error();
+    const double error_m = mean_depth_error_m(object.value(), shell);
+    if (error_m > kWorthFinerMaps * least_m) break;
+    least_m = error_m;
+    best = asset.parts;
+    by_budget = budget_decided;
+    if (by_budget || least_m <= kNearTarget * target.error_m) break;
+  }
+  asset.parts = std::move(best);
+  return by_budget;
+}
+
 Provenance provenance(const SourceMesh& source, const BakeOptions& options) {
   static constexpr const char* kAxisNames[] = {"x", "y", "z"};
   return {"sqbake",
@@ -240,12 +280,10 @@ Result<BakeResult> bake(const SourceMesh& source, const BakeOptions& options, co
   count_members(asset.parts, prepared.mesh, owner);
   asset.face_labels = label_input_faces(owner, prepared.mesh, source.source_face_count);
   const double target_m = options.max_error_percent / 100 * r_max_m;
-  if (map_parts(asset.parts, surface_areas(pieces, fine), queries, {target_m, options.max_bytes})) {
-    result.stopped_by = "bytes";
-  }
-  tbb::parallel_for(std::size_t{0}, asset.parts.size(), [&](std::size_t k) {
-    add_vertex_samples(asset.parts[k], queries, kVertexTolerance * target_m);
-  });
+  auto by_budget =
+      draw_maps(asset, surface_areas(pieces, fine), queries, {target_m, options.max_bytes}, options.seed);
+  if (!by_budget) return by_budget.error();
+  if (by_budget.value()) result.stopped_by = "bytes";
   asset.mesh = prepared.record;
   asset.provenance = provenance(source, options);
   if (progress.stop()) return cancelled();

@@ -132,7 +132,32 @@ Told ask(const runtime::Object& object, const ShellPoints& shell, const runtime:
   return told;
 }
 
+/// |told - true| signed distances [m], where one is told; inner points without one feel no force and count
+/// with their whole depth.
+std::vector<double> depth_errors_m(const Told& told, const ShellPoints& shell) {
+  std::vector<double> errors_m;
+  for (std::size_t i = 0; i < told.signed_distance_m.size(); ++i) {
+    const double told_m = told.signed_distance_m[i], truth_m = shell.signed_distance_m[i];
+    if (!std::isnan(told_m)) {
+      errors_m.push_back(std::abs(told_m - truth_m));
+    } else if (truth_m < 0) {
+      errors_m.push_back(-truth_m);
+    }
+  }
+  return errors_m;
+}
+
+double mean(const std::vector<double>& values) {
+  double sum = 0;
+  for (const double value : values) sum += value;
+  return values.empty() ? 0 : sum / static_cast<double>(values.size());
+}
+
 }  // namespace
+
+double mean_depth_error_m(const runtime::Object& object, const ShellPoints& shell) {
+  return mean(depth_errors_m(ask(object, shell, {runtime::Layer::kThree, 0}), shell));
+}
 
 ShellPoints sample_shell(const MeshQueries& queries, double half_width_m, std::uint32_t count,
                          std::uint64_t seed) {
@@ -180,23 +205,13 @@ std::vector<ErrorRow> measure(const Asset& asset, const runtime::Object& object,
       const runtime::QueryOptions options{static_cast<runtime::Layer>(layer), level};
       const Told of_wide = ask(object, wide, options), of_narrow = ask(object, narrow, options);
       std::vector<double> errors;
-      for (std::size_t i = 0; i < of_wide.signed_distance_m.size(); ++i) {
-        const double told_m = of_wide.signed_distance_m[i];
-        if (!std::isnan(told_m)) {
-          errors.push_back(std::abs(told_m - wide.signed_distance_m[i]));
-        } else if (layer > 1 && wide.signed_distance_m[i] < 0) {
-          errors.push_back(-wide.signed_distance_m[i]);  // an inner point told no distance feels no force
-        }
-      }
+      if (layer > 1) errors = depth_errors_m(of_wide, wide);
       std::sort(errors.begin(), errors.end());
-      double sum = 0;
-      for (const double e : errors) sum += e;
       ErrorRow row;
       row.level = level;
       row.layer = layer;
       row.eq35_percent = eq35_percent(asset, probes, layer, level);
-      row.depth_mean_percent =
-          errors.empty() ? kNone : 100 * sum / static_cast<double>(errors.size()) / asset.r_max_m;
+      row.depth_mean_percent = errors.empty() ? kNone : 100 * mean(errors) / asset.r_max_m;
       row.depth_p95_percent = errors.empty() ? kNone : 100 * errors[errors.size() * 95 / 100] / asset.r_max_m;
       row.misclassified_3_percent = misclassified_percent(of_wide, wide);
       row.misclassified_05_percent = misclassified_percent(of_narrow, narrow);

@@ -291,7 +291,8 @@ inline bool Chart::patch_beside(const Vec3f& p, std::uint32_t level, float& row,
   for (int ring = 0; ring < kStartRings && !std::isfinite(best_square); ++ring) {
     const auto step = static_cast<float>(stride << ring);
     for (int k = 0; k < 9; ++k) {
-      const float here_row = mid_row + static_cast<float>(k / 3 - 1) * step;
+      const int rows_up = k / 3 - 1;
+      const float here_row = mid_row + static_cast<float>(rows_up) * step;
       float here_col = mid_col + static_cast<float>(k % 3 - 1) * step;
       if (here_row < half || here_row > last) continue;
       here_col = here_col < 0 ? here_col + turn : here_col;

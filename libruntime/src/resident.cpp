@@ -62,7 +62,8 @@ SideList put_list(Layout& out, std::vector<Entry> entries, std::size_t texels, K
   SideList list;
   list.count = static_cast<std::uint32_t>(entries.size());
   if (entries.empty()) return list;
-  std::vector<std::uint8_t> blocks((texels + 8 * Resident::kBlock - 1) / (8 * Resident::kBlock));
+  std::vector<std::uint8_t> blocks((texels + std::size_t{8} * Resident::kBlock - 1) /
+                                   (std::size_t{8} * Resident::kBlock));
   for (const Entry& entry : entries) {
     const std::uint32_t block = key(entry) / Resident::kBlock;
     blocks[block / 8] = static_cast<std::uint8_t>(blocks[block / 8] | (1U << (block % 8)));

@@ -66,7 +66,8 @@ struct PartRecord {
   }
   double texels_at_level(std::uint32_t level) const noexcept {
     const std::uint32_t stride = stride_at(level);
-    return (static_cast<double>((rows - 1) / stride) + 1) * (cols / stride);
+    const std::uint32_t row_steps = (rows - 1) / stride, col_steps = cols / stride;
+    return (static_cast<double>(row_steps) + 1) * static_cast<double>(col_steps);
   }
 };
 
