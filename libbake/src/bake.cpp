@@ -27,11 +27,9 @@ namespace {
 
 // Vertex samples are kept where the surface misses the vertex by this multiple of the error target.
 constexpr double kVertexTolerance = 2;
-// Shell that finished maps are judged in: points, half width, and cap of one point's error as shares of
-// R_max.
+// Shell that finished maps are judged in: points, and half width as a share of R_max.
 constexpr std::uint32_t kShellPoints = 4000;
 constexpr double kShellWidth = 0.03;
-constexpr double kWorstError = 0.02;
 // Maps are drawn at most so often, each time for this share of the target before, while that takes a fourth
 // off the error and the error exceeds the target by a tenth.
 constexpr int kMapRounds = 4;
