@@ -183,6 +183,16 @@ class Checker {
                  "reason = " + std::to_string(static_cast<int>(part.reason)) + ", must be 0 to 4");
     require_part(std::isfinite(part.volume_m3), 27,
                  "volume_m3 = " + text(part.volume_m3) + ", must be finite");
+    // Rule 56 implies it; readers, which do not check that one, need it to keep lengths over the sphere's
+    // radius finite.
+    const double reach_m = asset_.sphere.radius_m * (1 + kSphereTolerance);
+    const double off_m = norm(part.object_from_part.translation_m - asset_.sphere.centre_m);
+    require_part(off_m <= reach_m && shape.semi_axes_m.x <= reach_m && shape.semi_axes_m.y <= reach_m &&
+                     shape.semi_axes_m.z <= reach_m,
+                 28,
+                 "its centre is " + text(off_m) + " m from that of the asset's sphere, its semi-axes are " +
+                     text(shape.semi_axes_m) + ", must be at most the sphere's radius of " +
+                     text(asset_.sphere.radius_m));
   }
 
   void check_grid(const DistanceMap& map) {

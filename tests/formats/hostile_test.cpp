@@ -2,6 +2,7 @@
 //
 // Bundles made to harm: correct header and digest, and behind them what HDF5 allows and a bundle must not
 // have.
+#include <algorithm>
 #include <cstring>
 #include <functional>
 #include <random>
@@ -124,6 +125,115 @@ TEST(Hostile, ResealedBitFlipsAreErrorsOrChangeNothing) {
   }
   EXPECT_GT(refused, 500) << "flips no longer reach what matters";
   EXPECT_EQ(H5Fget_obj_count(static_cast<hid_t>(H5F_OBJ_ALL), H5F_OBJ_ALL), 0) << "identifiers left open";
+}
+
+/// Length and digests as they would be had the file been made like this.
+Bytes resealed(Bytes bytes) {
+  const std::uint64_t length = bytes.size();
+  constexpr std::size_t kEndOfFileAt = 512 + 28;  // of the superblock
+  if (bytes.size() >= kEndOfFileAt + 8) std::memcpy(bytes.data() + kEndOfFileAt, &length, 8);
+  test::reseal(bytes);
+  return bytes;
+}
+
+TEST(Hostile, EveryResealedTruncationIsAnError) {
+  const Bytes bytes = io::encode(rich_asset()).value();
+  ASSERT_EQ(finding(resealed(bytes)), "");
+  for (std::size_t size = 512; size < bytes.size(); ++size) {
+    Bytes cut(bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(size));
+    ASSERT_NE(finding(resealed(std::move(cut))), "") << size << " bytes";
+  }
+}
+
+TEST(Hostile, ConcatenationsAreRefusedOrGiveTheFirst) {
+  const Bytes one = io::encode(rich_asset()).value();
+  Asset other = rich_asset();
+  other.parts.resize(2);
+  other.face_labels.assign(8, 0);
+  const Bytes two = io::encode(other).value();
+  for (const auto& [first, second] : {std::pair{&one, &two}, {&two, &one}, {&one, &one}}) {
+    Bytes both = *first;
+    both.insert(both.end(), second->begin(), second->end());
+    EXPECT_NE(finding(both), "") << "without a new seal";
+    const auto decoded = io::decode(resealed(both));
+    const Asset& expected = first == &one ? rich_asset() : other;
+    EXPECT_TRUE(!decoded || test::identical(decoded.value(), expected));
+  }
+}
+
+TEST(Hostile, SwappedDatasetsAreRefused) {
+  const std::pair<const char*, const char*> pairs[] = {
+      {"/parts/vertex_count", "/parts/face_count"},    // alike in type and shape: only the content hash tells
+      {"/parts/semi_axes_m", "/parts/translation_m"},  //
+      {"/maps/crossing_code", "/maps/vertex_code"},    // other lengths
+      {"/parts/segment", "/parts/volume_m3"},          // another type
+      {"/maps/crossing_texel", "/maps/vertex_position"}  //
+  };
+  for (const auto& [a, b] : pairs) {
+    const std::string found = finding(forged([a = a, b = b](hid_t file) {
+      H5Lmove(file, a, file, "/elsewhere", H5P_DEFAULT, H5P_DEFAULT);
+      H5Lmove(file, b, file, a, H5P_DEFAULT, H5P_DEFAULT);
+      EXPECT_GE(H5Lmove(file, "/elsewhere", file, b, H5P_DEFAULT, H5P_DEFAULT), 0);
+    }));
+    EXPECT_NE(found, "") << a << ' ' << b;
+  }
+}
+
+TEST(Hostile, GroupsAndDatasetsInEachOthersPlaceAreRefused) {
+  expect_refused("\"/parts\"", [](hid_t file) {
+    H5Lmove(file, "/parts", file, "/other", H5P_DEFAULT, H5P_DEFAULT);
+    EXPECT_GE(H5Lcreate_hard(file, "/face_labels", file, "/parts", H5P_DEFAULT, H5P_DEFAULT), 0);
+  });
+  expect_refused("\"/face_labels\"", [](hid_t file) {
+    H5Ldelete(file, "/face_labels", H5P_DEFAULT);
+    EXPECT_TRUE(
+        Hdf5Handle(H5Gcreate2(file, "/face_labels", H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT), H5Gclose));
+  });
+}
+
+TEST(Hostile, LinksAndAttributesOutsideOfTheHeaderAreRefused) {
+  // Beyond the limits of its creation a group moves its links to a heap, an object its attributes.
+  expect_refused("outside of its header", [](hid_t file) {
+    for (int k = 0; k < 300; ++k) {
+      const std::string name = "/maps/more_" + std::to_string(k);
+      H5Lcreate_hard(file, "/maps/code", file, name.c_str(), H5P_DEFAULT, H5P_DEFAULT);
+    }
+  });
+  expect_refused("outside of its header", [](hid_t file) {
+    const Hdf5Handle space(H5Screate(H5S_SCALAR), H5Sclose);
+    for (int k = 0; k < 300; ++k) {
+      const std::string name = "more_" + std::to_string(k);
+      const Hdf5Handle attribute(
+          H5Acreate2(file, name.c_str(), H5T_STD_U8LE, space.get(), H5P_DEFAULT, H5P_DEFAULT), H5Aclose);
+    }
+  });
+}
+
+TEST(Hostile, NamesThatTheFormatDoesNotKnowAreIgnored) {
+  EXPECT_EQ(finding(forged([](hid_t file) {
+              const Hdf5Handle group(H5Gcreate2(file, "/more", H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT),
+                                     H5Gclose);
+              const Hdf5Handle space(H5Screate(H5S_SCALAR), H5Sclose);
+              const Hdf5Handle attribute(
+                  H5Acreate2(file, "more", H5T_STD_U8LE, space.get(), H5P_DEFAULT, H5P_DEFAULT), H5Aclose);
+              EXPECT_TRUE(group && attribute);
+            })),
+            "");
+}
+
+// Continuation blocks that lead back to themselves, in the words of the file format.
+TEST(Hostile, HeadersWithoutEndAreRefused) {
+  Bytes bytes = io::encode(rich_asset()).value();
+  const std::string block = "OCHK";
+  const auto at = std::search(bytes.begin() + 512, bytes.end(), block.begin(), block.end());
+  ASSERT_NE(at, bytes.end());
+  const auto here = static_cast<std::uint64_t>(at - bytes.begin()) - 512, size = std::uint64_t{28};
+  const std::uint8_t message[4] = {0x10, 16, 0, 0};  // continuation of 16 bytes: address, length
+  std::copy(std::begin(message), std::end(message), at + 4);
+  std::memcpy(&*at + 8, &here, 8);
+  std::memcpy(&*at + 16, &size, 8);
+  const std::string found = finding(resealed(bytes));
+  EXPECT_NE(found.find("continues in a block that is not in the file"), std::string::npos) << found;
 }
 
 TEST(Hostile, SoftLinksAreRefused) {

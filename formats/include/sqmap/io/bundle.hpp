@@ -28,9 +28,14 @@ struct ReadLimits {
   std::uint64_t max_decoded_bytes = std::uint64_t{512} << 20;  ///< sum of all declared datasets
 };
 
-/// Reads and validates (quick) a bundle held in memory. Safe on hostile bytes: walks a fixed list of names,
-/// checks every size before it allocates, loads no plugin, follows no link out of the file. Errors:
-/// kInvalidAsset with the dataset and the rule; kUnsupportedVersion with both versions.
+/// Reading allocates at most kMostMemoryShare * max_decoded_bytes + kMostMemoryBytes, and the file itself.
+inline constexpr std::uint64_t kMostMemoryShare = 4;
+inline constexpr std::uint64_t kMostMemoryBytes = std::uint64_t{16} << 20;
+
+/// Reads and validates (quick) a bundle held in memory. Safe on hostile bytes: parses the little of HDF5 that
+/// bundles use without the HDF5 library, walks a fixed list of names, checks every size before it allocates,
+/// follows no link out of the file. Errors: kInvalidAsset with the dataset and the rule; kUnsupportedVersion
+/// with both versions.
 Result<Asset> decode(std::span<const std::uint8_t> bytes, const ReadLimits& limits = {});
 
 /// decode() of a file. Errors: also kFileMissing, kFileUnreadable.

@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Hard shapes: superquadrics of extreme exponents and axis ratios, each with a surface at one constant depth
+// below it, so that the signed distance of layer 2 is that depth less the distance to the superquadric.
+#pragma once
+
+#include <array>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "sqmap/runtime/object.hpp"
+
+#include "support/analytic_asset.hpp"
+
+namespace sqmap::test {
+
+inline constexpr std::array<double, 5> kExponents{0.1, 0.3, 1.0, 1.9, 2.0};
+inline constexpr std::array<runtime::SimdTarget, 4> kTargets{
+    runtime::SimdTarget::kBaseline, runtime::SimdTarget::kSse4, runtime::SimdTarget::kAvx2,
+    runtime::SimdTarget::kAvx512};
+
+/// Sets each instruction set that this processor has, one after the other, and the one before at the end.
+template <class Run>
+int for_each_target(const Run& run) {
+  const runtime::SimdTarget before = runtime::simd_target();
+  int count = 0;
+  for (const runtime::SimdTarget target : kTargets) {
+    if (!runtime::set_simd_target(target)) continue;
+    run(target);
+    ++count;
+  }
+  runtime::set_simd_target(before);
+  return count;
+}
+
+/// One part; every ray enters the material at depth_m.
+inline Asset shell_asset(const Superquadric& shape, double depth_m, std::uint32_t rows = 17,
+                         std::uint32_t cols = 32, const Vec3d& centre_m = {}) {
+  const double reach_m = 4 * depth_m;
+  Part part = traced_part(shape, centre_m, rows, cols, 1, reach_m,
+                          [depth_m](const Vec3d&, const Vec3d&, bool& inside) {
+                            inside = false;
+                            return std::vector<double>{depth_m};
+                          });
+  // The code nearest to depth_m stands for it exactly.
+  part.map.depth_step_m = depth_m / part.map.code.front();
+  return asset_of({part}, 2 * part.sphere.radius_m);
+}
+
+/// Answers of the batch in use.
+struct Batch {
+  explicit Batch(std::size_t count)
+      : distance_m(count), normal(count), surface_m(count), part(count), layer(count), inside(count) {}
+  runtime::Answers answers() { return {distance_m, normal, surface_m, part, layer, inside}; }
+  std::vector<float> distance_m;
+  std::vector<Vec3f> normal, surface_m;
+  std::vector<std::uint32_t> part;
+  std::vector<std::uint8_t> layer, inside;
+};
+
+inline std::string name_of(const Superquadric& s) {
+  return "axes " + std::to_string(s.semi_axes_m.x) + " " + std::to_string(s.semi_axes_m.y) + " " +
+         std::to_string(s.semi_axes_m.z) + ", e " + std::to_string(s.e1) + " " + std::to_string(s.e2);
+}
+
+}  // namespace sqmap::test
