@@ -11,6 +11,7 @@
 
 #include "peer.hpp"
 #include "peer_rows.hpp"
+#include "scene_frames.hpp"
 #include "suites.hpp"
 #include "timing.hpp"
 #include "work.hpp"
@@ -92,6 +93,7 @@ void run_model(const SuiteInput& input, const Model& model, Results& results) {
 
 void run_frames(const SuiteInput& input, Results& results) {
   for (const Model& model : input.models) run_model(input, model, results);
+  run_scene(input, results);
 }
 
 }  // namespace sqmap::bench

@@ -1,253 +1,323 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// A chunk of points against all parts: sphere and box, layer 1, layers 2 and 3, and what the charts say
-// together. Each step is done by whole vectors of points that passed the one before.
+// A chunk of points against all parts: which superquadrics hold which points (cull.inl), what each of their
+// charts says (look.inl, walk.inl), and what the charts say together. Each step is done for whole vectors of
+// entries, part by part.
 
-/// What is known of each point so far: the variables of Object::query(point).
-struct alignas(64) Findings {
-  float nearest[kPadded], sharpest[kPadded], nearest_certainty[kPadded], offset[kPadded];
-  std::int32_t flags[kPadded];
+/// Unpacked curves of the parts that were asked last.
+class Charts {
+ public:
+  explicit Charts(const Resident& resident) noexcept : resident_(resident) {
+    std::fill(std::begin(held_), std::end(held_), kNowhere);
+  }
+  const ShapeTable<float>& table(std::uint32_t part) noexcept {
+    // Parts of one chunk tend to be few: the slots go round.
+    for (std::uint32_t k = 0; k < kTables; ++k)
+      if (held_[k] == part) return tables_[k];
+    const std::uint32_t slot = next_;
+    next_ = (next_ + 1) % kTables;
+    held_[slot] = part;
+    resident_.unpack(resident_.part(part), tables_[slot]);
+    return tables_[slot];
+  }
+
+ private:
+  static constexpr std::uint32_t kTables = 8;
+  const Resident& resident_;
+  std::uint32_t held_[kTables], next_ = 0;
+  ShapeTable<float> tables_[kTables];
 };
-constexpr std::int32_t kInside = 1, kNearestInside = 2, kNearestFaces = 4, kSecondLayer = 8, kThirdLayer = 16,
-                       kFirstLayer = 32, kSuspect = 64;
 
-/// Points of the chunk that lie in one part, in its frame.
-struct alignas(64) PartPoints {
-  float x[kPadded], y[kPadded], z[kPadded];
-  std::int32_t index[kPadded];
-  std::uint32_t count = 0;
+/// Answers one chunk after another.
+class Answerer {
+ public:
+  Answerer(const Resident& resident, const QueryOptions& options, const Wants& wants) noexcept
+      : resident_(resident), options_(options), wants_(wants), charts_(resident) {}
+
+  /// Pairs of a point and a superquadric that holds it.
+  HWY_NOINLINE std::uint64_t pairs(const Chunk& chunk) noexcept {
+    std::uint64_t sum = 0;
+    for (std::uint32_t k = 0; k < resident_.part_count(); ++k) {
+      entries_.clear();
+      cull(resident_.part(k), chunk, entries_);
+      if (entries_.count > 0) first_layer(resident_.part(k), 0, entries_);
+      sum += entries_.count;
+    }
+    return sum;
+  }
+
+  HWY_NOINLINE void answer(const Chunk& chunk, Findings& findings) noexcept {
+    findings.count = 0;
+    entries_.clear();
+    std::memset(known_, 0, sizeof known_);
+    bool is_whole = true;  // all entries of the chunk are at hand together
+    for (std::uint32_t k = 0; k < resident_.part_count(); ++k) {
+      const PartRecord& part = resident_.part(k);
+      if (!entries_.has_room_for(chunk.count)) {
+        is_whole = false;
+        look(chunk, is_whole, findings);
+        entries_.clear();
+      }
+      const std::uint32_t begin = entries_.count;
+      cull(part, chunk, entries_);
+      if (entries_.count == begin) continue;
+      first_layer(part, begin, entries_);
+      if (entries_.count == begin) continue;
+      entries_.ranges[entries_.range_count++] = {k, begin, entries_.count};
+      // Ranges begin at whole vectors; those in between are of a point that nobody reads.
+      entries_.count = (entries_.count + lane_count() - 1) / lane_count() * lane_count();
+    }
+    if (entries_.range_count > 0) look(chunk, is_whole, findings);
+  }
+
+ private:
+  void look(const Chunk& chunk, bool is_whole, Findings& findings) noexcept {
+    if (options_.layer == Layer::kOne) return answer_first(findings);
+    second_layer();
+    third_layer(chunk, is_whole);
+    combine(findings);
+    list(findings);
+    if (options_.edge_length_m > 0) offset(findings);
+    if (!wants_.normal && !wants_.surface) return;
+    mark_wanted(is_whole, findings);
+    for (std::uint32_t r = 0; r < entries_.range_count; ++r) place(entries_.ranges[r]);
+    hand_over(findings);
+  }
+
+  /// The points that have a finding, in their order, which does not depend on that of the parts.
+  void list(Findings& findings) const noexcept {
+    findings.count = 0;
+    for (std::uint32_t word = 0; word < kChunkPoints / 32; ++word)
+      for (std::uint32_t bits = known_[word]; bits != 0; bits &= bits - 1)
+        findings.points[findings.count++] =
+            static_cast<std::uint16_t>(32 * word + static_cast<std::uint32_t>(std::countr_zero(bits)));
+  }
+  bool is_new(std::int32_t point) noexcept {
+    std::uint32_t& word = known_[static_cast<std::uint32_t>(point) / 32];
+    const std::uint32_t bit = 1U << (static_cast<std::uint32_t>(point) % 32);
+    const bool result = (word & bit) == 0;
+    word |= bit;
+    return result;
+  }
+  HWY_NOINLINE void answer_first(Findings& findings) noexcept;
+  HWY_NOINLINE void second_layer() noexcept;
+  HWY_NOINLINE void third_layer(const Chunk& chunk, bool is_whole) noexcept;
+  HWY_NOINLINE void combine(Findings& findings) noexcept;
+  HWY_NOINLINE void offset(Findings& findings) noexcept;
+  HWY_NOINLINE void mark_wanted(bool is_whole, Findings& findings) noexcept;
+  HWY_NOINLINE void place(const EntryRange& range) noexcept;
+  HWY_NOINLINE void hand_over(Findings& findings) noexcept;
+
+  const Resident& resident_;
+  const QueryOptions& options_;
+  Wants wants_;
+  Charts charts_;
+  Entries entries_;
+  HWY_ALIGN std::int32_t asked_[kPadded];
+  std::uint32_t known_[kChunkPoints / 32];  // points that have a finding, one bit each
 };
-
-HWY_INLINE V3 load3(const float* x, const float* y, const float* z, std::uint32_t i) {
-  return {hn::LoadU(kD, x + i), hn::LoadU(kD, y + i), hn::LoadU(kD, z + i)};
-}
-HWY_INLINE M in_ball(const V3& p, const Vec3f& centre, float square) {
-  const V3 d = p - all(centre);
-  return hn::Le(dot3(d, d), all(square));
-}
-/// Appends the lanes of mask.
-HWY_INLINE void append(M mask, const V3& p, VI index, PartPoints& out) {
-  // Compress and a whole store: a compressing store is microcode on some processors.
-  hn::StoreU(hn::Compress(p.x, mask), kD, out.x + out.count);
-  hn::StoreU(hn::Compress(p.y, mask), kD, out.y + out.count);
-  hn::StoreU(hn::Compress(p.z, mask), kD, out.z + out.count);
-  hn::StoreU(hn::Compress(index, hn::RebindMask(kDI, mask)), kDI, out.index + out.count);
-  out.count += static_cast<std::uint32_t>(hn::CountTrue(kD, mask));
-}
-
-/// Points in the part's sphere, then those of them in its box.
-HWY_NOINLINE void cull(const PartRecord& part, const Chunk& chunk, PartPoints& out) {
-  HWY_ALIGN std::int32_t in_sphere[kPadded];
-  std::uint32_t sphere_count = 0;
-  const auto test = [&](std::uint32_t begin, std::uint32_t end) HWY_ATTR {
-    for (std::uint32_t i = begin; i < end; i += lane_count()) {
-      const V3 p = load3(chunk.x, chunk.y, chunk.z, i);
-      const M mask = hn::And(in_ball(p, part.sphere_centre, part.sphere_square), hn::FirstN(kD, end - i));
-      const VI index = hn::Iota(kDI, static_cast<std::int32_t>(i));
-      hn::StoreU(hn::Compress(index, hn::RebindMask(kDI, mask)), kDI, in_sphere + sphere_count);
-      sphere_count += static_cast<std::uint32_t>(hn::CountTrue(kD, mask));
-    }
-  };
-  if (chunk.block_count == 0) test(0, chunk.count);
-  for (std::uint32_t first = 0; first < chunk.block_count; first += lane_count()) {
-    const V3 d = load3(chunk.block_centre[0], chunk.block_centre[1], chunk.block_centre[2], first) -
-                 all(part.sphere_centre);
-    const V reach = all(part.sphere_radius) + hn::LoadU(kD, chunk.block_radius + first);
-    const M near = hn::And(hn::Le(dot3(d, d), reach * reach), hn::FirstN(kD, chunk.block_count - first));
-    if (none(near)) continue;
-    HWY_ALIGN float touches[kMostLanes];
-    hn::Store(hn::IfThenElseZero(near, all(1.0F)), kD, touches);
-    for (std::uint32_t lane = 0; lane < lane_count() && first + lane < chunk.block_count; ++lane) {
-      const std::uint32_t begin = (first + lane) * kBlockPoints;
-      if (touches[lane] > 0) test(begin, std::min(chunk.count, begin + kBlockPoints));
-    }
-  }
-  out.count = 0;
-  if (sphere_count == 0) return;
-  hn::StoreU(hn::Zero(kDI), kDI, in_sphere + sphere_count);
-  for (std::uint32_t i = 0; i < sphere_count; i += lane_count()) {
-    const VI index = hn::LoadU(kDI, in_sphere + i);
-    const V3 p{hn::GatherIndex(kD, chunk.x, index), hn::GatherIndex(kD, chunk.y, index),
-               hn::GatherIndex(kD, chunk.z, index)};
-    const V3 q = rotated_back(part.object_from_part, p - all(part.translation));
-    M mask = hn::FirstN(kD, sphere_count - i);
-    mask = hn::And(mask, hn::Le(hn::Abs(q.x) * all(part.inverse_axes.x), all(1.0F)));
-    mask = hn::And(mask, hn::Le(hn::Abs(q.y) * all(part.inverse_axes.y), all(1.0F)));
-    mask = hn::And(mask, hn::Le(hn::Abs(q.z) * all(part.inverse_axes.z), all(1.0F)));
-    append(mask, q, index, out);
-  }
-}
-
-/// Leaves the points in the superquadric, and pads them to whole vectors.
-HWY_NOINLINE void first_layer(const PartRecord& part, PartPoints& points) {
-  const std::uint32_t count = points.count;
-  points.count = 0;
-  for (std::uint32_t i = 0; i < count; i += lane_count()) {
-    const V3 p = load3(points.x, points.y, points.z, i);
-    const VI index = hn::LoadU(kDI, points.index + i);
-    const V x = hn::Abs(p.x) * all(part.inverse_axes.x), y = hn::Abs(p.y) * all(part.inverse_axes.y),
-            z = hn::Abs(p.z) * all(part.inverse_axes.z);
-    const V across = power_of(x, part.power_2) + power_of(y, part.power_2);
-    const V sum = power_of(across, part.power_ratio) + power_of(z, part.power_1);
-    append(hn::And(hn::Le(sum, all(1.0F)), hn::FirstN(kD, count - i)), p, index, points);
-  }
-  if (points.count == 0) return;
-  hn::StoreU(hn::Zero(kD), kD, points.x + points.count);
-  hn::StoreU(hn::Zero(kD), kD, points.y + points.count);
-  hn::StoreU(hn::Zero(kD), kD, points.z + points.count);
-  hn::StoreU(all_int(kChunkPoints), kDI, points.index + points.count);  // a place nobody reads
-}
 
 /// The superquadric alone: inside any part is inside; the first that holds a point answers.
-HWY_NOINLINE void answer_first(const PartRecord& part, std::uint32_t part_index, const PartPoints& points,
-                               const Wants& wants, Findings& findings, Chunk& chunk) {
-  for (std::uint32_t k = 0; k < points.count; ++k) {
-    const std::int32_t i = points.index[k];
-    findings.flags[i] = kFirstLayer | kInside | kSuspect;
-    chunk.part[i] = static_cast<std::int32_t>(part_index);
-    chunk.x[i] = std::numeric_limits<float>::infinity();  // in no ball: the point is answered
-    if (!wants.normal) continue;
-    const Vec3f n = part.object_from_part.apply(shape_normal(part, {points.x[k], points.y[k], points.z[k]}));
-    for (int axis = 0; axis < 3; ++axis) chunk.normal[axis][i] = n[axis];
+HWY_NOINLINE void Answerer::answer_first(Findings& findings) noexcept {
+  for (std::uint32_t r = 0; r < entries_.range_count; ++r) {
+    const EntryRange& range = entries_.ranges[r];
+    const PartRecord& part = resident_.part(range.part);
+    for (std::uint32_t i = range.begin; wants_.normal && i < range.end; i += lane_count()) {
+      const V3 n =
+          rotated(part.object_from_part, shape_normal_of(part, load3(entries_.x, entries_.y, entries_.z, i)));
+      hn::StoreU(n.x, kD, entries_.normal[0] + i);
+      hn::StoreU(n.y, kD, entries_.normal[1] + i);
+      hn::StoreU(n.z, kD, entries_.normal[2] + i);
+    }
+    for (std::uint32_t i = range.begin; i < range.end; ++i) {
+      const std::int32_t point = entries_.point[i];
+      if (!is_new(point)) continue;
+      Finding& finding = findings.of[point];
+      finding.clear();
+      finding.inside = true;
+      finding.part = range.part;
+      finding.layer = 1;
+      for (int axis = 0; axis < 3 && wants_.normal; ++axis) finding.normal[axis] = entries_.normal[axis][i];
+    }
+  }
+  list(findings);
+}
+
+HWY_NOINLINE void Answerer::second_layer() noexcept {
+  for (std::uint32_t r = 0; r < entries_.range_count; ++r) {
+    const EntryRange& range = entries_.ranges[r];
+    const PartRecord& part = resident_.part(range.part);
+    const Chart chart(resident_, part, charts_.table(range.part));
+    const Looker looker(resident_, part, chart, options_.level);
+    for (std::uint32_t i = range.begin; i < range.end; i += lane_count()) {
+      const Look look = looker.look(load3(entries_.x, entries_.y, entries_.z, i),
+                                    hn::FirstN(kD, range.end - i), wants_.reach);
+      hn::StoreU(look.row, kD, entries_.row + i);
+      hn::StoreU(look.col, kD, entries_.col + i);
+      hn::StoreU(look.crossing, kD, entries_.crossing + i);
+      hn::StoreU(look.distance, kD, entries_.distance + i);
+      hn::StoreU(look.certainty, kD, entries_.certainty + i);
+      hn::StoreU(look.flags, kDI, entries_.flags + i);
+    }
   }
 }
 
-HWY_INLINE void replace(M mask, V value, float* array, VI index) {
-  hn::ScatterIndex(pick(mask, value, hn::GatherIndex(kD, array, index)), kD, array, index);
+/// Layer 3 for the charts of points that need it: all, or those that can be contacts. That a point cannot is
+/// known only when all its charts have been asked.
+HWY_NOINLINE void Answerer::third_layer(const Chunk& chunk, bool is_whole) noexcept {
+  const bool selects = wants_.contacts && is_whole;
+  for (std::uint32_t i = 0; i < chunk.count; i += lane_count())
+    hn::Store(all_int(selects ? 0 : 1), kDI, asked_ + i);
+  asked_[kChunkPoints] = 0;
+  for (std::uint32_t r = 0; selects && r < entries_.range_count; ++r) {
+    for (std::uint32_t i = entries_.ranges[r].begin; i < entries_.ranges[r].end; ++i)
+      if ((entries_.flags[i] & (kInside | kWithin)) != 0) asked_[entries_.point[i]] = 1;
+  }
+  for (std::uint32_t r = 0; r < entries_.range_count; ++r) {
+    const EntryRange& range = entries_.ranges[r];
+    const PartRecord& part = resident_.part(range.part);
+    if (layer_for(part, options_) != Layer::kThree) continue;
+    const Chart chart(resident_, part, charts_.table(range.part));
+    const Looker looker(resident_, part, chart, options_.level);
+    Walker(looker, wants_, entries_).refine(range.begin, range.end, asked_);
+  }
 }
 
-HWY_NOINLINE void answer_deeper(const Resident& resident, std::uint32_t part_index, const PartPoints& points,
-                                bool third, const QueryOptions& options, const Wants& wants,
-                                Findings& findings, Chunk& chunk) {
-  const PartRecord& part = resident.part(part_index);
-  const Chart chart(resident, part);
-  const Looker looker(resident, part, chart, options.level);
-  const float edge = resident.units_per_m() * options.edge_length_m;
-  const VI this_part = all_int(part_index), nowhere = hn::Set(kDI, -1);
-  for (std::uint32_t k = 0; k < points.count; k += lane_count()) {
-    const V3 p = load3(points.x, points.y, points.z, k);
-    const VI index = hn::LoadU(kDI, points.index + k);
-    const Look look = looker.look(p, hn::FirstN(kD, points.count - k), third, wants);
-
-    VI flags = hn::GatherIndex(kDI, findings.flags, index);
-    VI answering = hn::GatherIndex(kDI, chunk.part, index);
-    const V sharpest = hn::GatherIndex(kD, findings.sharpest, index);
-    const V nearest = hn::GatherIndex(kD, findings.nearest, index);
-    const VI inside = pick(look.inside, all_int(kInside), hn::Zero(kDI));
-    const M sharper = hn::Gt(look.certainty, sharpest), nearer = hn::Lt(look.distance, nearest);
-    flags = hn::Or(flags, all_int(third ? kThirdLayer : kSecondLayer));
-    if (wants.suspects)
-      flags = hn::Or(flags, pick(hn::Or(look.inside, look.within), all_int(kSuspect), hn::Zero(kDI)));
-    flags = pick(sharper, hn::Or(hn::AndNot(all_int(kInside), flags), inside), flags);
-    answering = pick(hn::And(sharper, as_float(hn::Eq(answering, nowhere))), this_part, answering);
-    answering = pick(nearer, this_part, answering);
-    const VI faces = pick(look.faces_patch, all_int(kNearestFaces), hn::Zero(kDI));
-    const VI of_nearest = hn::Or(hn::ShiftLeft<1>(inside), faces);
-    flags =
-        pick(nearer, hn::Or(hn::AndNot(all_int(kNearestInside | kNearestFaces), flags), of_nearest), flags);
-    hn::ScatterIndex(flags, kDI, findings.flags, index);
-    hn::ScatterIndex(answering, kDI, chunk.part, index);
-    hn::ScatterIndex(pick(sharper, look.certainty, sharpest), kD, findings.sharpest, index);
-    if (none(nearer)) continue;
-    hn::ScatterIndex(pick(nearer, look.distance, nearest), kD, findings.nearest, index);
-    replace(nearer, look.certainty, findings.nearest_certainty, index);
-    if (wants.normal) {
-      const V3 n = rotated(part.object_from_part, look.normal);
-      replace(nearer, n.x, chunk.normal[0], index);
-      replace(nearer, n.y, chunk.normal[1], index);
-      replace(nearer, n.z, chunk.normal[2], index);
-    }
-    if (wants.surface) {
-      const V unit = all(resident.unit_m());
-      const V3 s = unit * (rotated(part.object_from_part, look.surface) + all(part.translation));
-      replace(nearer, s.x, chunk.surface_m[0], index);
-      replace(nearer, s.y, chunk.surface_m[1], index);
-      replace(nearer, s.z, chunk.surface_m[2], index);
-    }
-    if (!(edge > 0)) continue;
-    HWY_ALIGN float rows[kMostLanes], cols[kMostLanes], changed[kMostLanes];
-    hn::Store(look.row, kD, rows);
-    hn::Store(look.col, kD, cols);
-    hn::Store(hn::IfThenElseZero(nearer, all(1.0F)), kD, changed);
-    for (std::uint32_t lane = 0; lane < lane_count() && k + lane < points.count; ++lane) {
-      if (changed[lane] > 0) {
-        findings.offset[points.index[k + lane]] = chart.offset(rows[lane], cols[lane], options.level, edge);
+/// Charts overlap. The nearest represented surface tells the distance, and the side too, unless another
+/// chart's ray leaves far less doubt: Object::query(point).
+HWY_NOINLINE void Answerer::combine(Findings& findings) noexcept {
+  for (std::uint32_t r = 0; r < entries_.range_count; ++r) {
+    const EntryRange& range = entries_.ranges[r];
+    const auto layer = static_cast<std::uint8_t>(layer_for(resident_.part(range.part), options_));
+    for (std::uint32_t i = range.begin; i < range.end; ++i) {
+      const std::int32_t point = entries_.point[i];
+      Finding& finding = findings.of[point];
+      if (is_new(point)) {
+        finding.clear();
+      }
+      finding.layer = std::max(finding.layer, layer);
+      const bool inside = (entries_.flags[i] & kInside) != 0;
+      if (entries_.certainty[i] > finding.sharpest) {
+        finding.sharpest = entries_.certainty[i];
+        finding.inside = inside;
+        if (finding.part == kNowhere) finding.part = range.part;
+      }
+      if (entries_.distance[i] < finding.nearest) {
+        finding.nearest = entries_.distance[i];
+        finding.nearest_certainty = entries_.certainty[i];
+        finding.nearest_inside = inside;
+        finding.nearest_faces = (entries_.flags[i] & kFaces) != 0;
+        finding.part = range.part;
+        finding.nearest_entry = static_cast<std::int32_t>(i);
       }
     }
   }
 }
 
-/// Turns findings into answers.
-HWY_NOINLINE void conclude(const Resident& resident, const Findings& findings, Chunk& chunk) {
-  const V unit = all(resident.unit_m()), infinity = all(std::numeric_limits<float>::infinity());
-  const auto has = [](VI flags, std::int32_t flag) HWY_ATTR {
-    return as_float(hn::Ne(hn::And(flags, hn::Set(kDI, flag)), hn::Zero(kDI)));
+HWY_NOINLINE void Answerer::offset(Findings& findings) noexcept {
+  const float edge = resident_.units_per_m() * options_.edge_length_m;
+  for (std::uint32_t k = 0; k < findings.count; ++k) {
+    Finding& finding = findings.of[findings.points[k]];
+    if (finding.nearest_entry < 0) continue;
+    const Chart chart(resident_, resident_.part(finding.part), charts_.table(finding.part));
+    finding.offset = chart.offset(entries_.row[finding.nearest_entry], entries_.col[finding.nearest_entry],
+                                  options_.level, edge);
+  }
+}
+
+HWY_NOINLINE void Answerer::mark_wanted(bool is_whole, Findings& findings) noexcept {
+  const bool selects = wants_.contacts && is_whole;
+  for (std::uint32_t k = 0; k < findings.count; ++k) {
+    const Finding& finding = findings.of[findings.points[k]];
+    if (finding.nearest_entry < 0) continue;
+    const bool is_wanted = !selects || finding.signed_distance_m(resident_.unit_m()) < wants_.within_m;
+    entries_.flags[finding.nearest_entry] |= is_wanted ? kWanted : 0;
+  }
+}
+
+/// Surfaces and normals of the entries that want them, in the object's frame.
+HWY_NOINLINE void Answerer::place(const EntryRange& range) noexcept {
+  const PartRecord& part = resident_.part(range.part);
+  const Chart chart(resident_, part, charts_.table(range.part));
+  const Looker looker(resident_, part, chart, options_.level);
+  const auto loaded = [](float(&values)[3][Entries::kLength], std::uint32_t i)
+                          HWY_ATTR { return load3(values[0], values[1], values[2], i); };
+  const auto store = [](const V3& v, float(&values)[3][Entries::kLength], std::uint32_t i) HWY_ATTR {
+    hn::StoreU(v.x, kD, values[0] + i);
+    hn::StoreU(v.y, kD, values[1] + i);
+    hn::StoreU(v.z, kD, values[2] + i);
   };
-  for (std::uint32_t i = 0; i < chunk.count; i += lane_count()) {
-    const VI flags = hn::Load(kDI, findings.flags + i);
-    const V nearest = hn::Load(kD, findings.nearest + i);
-    const M undisputed = hn::Lt(hn::Load(kD, findings.sharpest + i),
-                                all(kOverrule) * hn::Load(kD, findings.nearest_certainty + i));
-    const M by_nearest = hn::And(has(flags, kNearestFaces), undisputed);
-    const M inside =
-        hn::Or(hn::And(by_nearest, has(flags, kNearestInside)), hn::AndNot(by_nearest, has(flags, kInside)));
-    const V distance = pick(inside, hn::Neg(nearest), nearest) - hn::Load(kD, findings.offset + i);
-    hn::Store(pick(hn::Lt(nearest, infinity), unit * distance, all(std::numeric_limits<float>::quiet_NaN())),
-              kD, chunk.signed_distance_m + i);
-    hn::Store(pick(inside, all_int(1), hn::Zero(kDI)), kDI, chunk.inside + i);
-    const VI second = pick(has(flags, kSecondLayer), all_int(2), hn::Zero(kDI));
-    const VI first = pick(has(flags, kFirstLayer), all_int(1), second);
-    hn::Store(hn::And(flags, all_int(kSuspect)), kDI, chunk.suspect + i);
-    hn::Store(pick(has(flags, kThirdLayer), all_int(3), first), kDI, chunk.layer + i);
+  for (std::uint32_t i = range.begin; i < range.end; i += lane_count()) {
+    const VI flags = hn::LoadU(kDI, entries_.flags + i);
+    const auto has = [&](std::int32_t flag) HWY_ATTR {
+      return as_float(hn::Ne(hn::And(flags, hn::Set(kDI, flag)), hn::Zero(kDI)));
+    };
+    const M wanted = hn::And(hn::FirstN(kD, range.end - i), has(kWanted));
+    if (none(wanted)) continue;
+    const M refined = has(kRefined);
+    V3 surface = loaded(entries_.surface, i), normal = loaded(entries_.normal, i);
+    if (!none(hn::AndNot(refined, wanted))) {
+      const V row = hn::LoadU(kD, entries_.row + i), col = hn::LoadU(kD, entries_.col + i);
+      if (wants_.surface)
+        surface = pick(refined, surface, looker.surface_at(row, col, hn::LoadU(kD, entries_.crossing + i)));
+      if (wants_.normal) normal = pick(refined, normal, looker.normal_at(row, col, has(kLeaving)));
+    }
+    if (wants_.surface)
+      store(rotated(part.object_from_part, surface) + all(part.translation), entries_.surface, i);
+    if (wants_.normal) store(rotated(part.object_from_part, normal), entries_.normal, i);
   }
 }
 
-void answer(const Resident& resident, const QueryOptions& options, const Wants& wants,
-            Chunk& chunk) noexcept {
-  Findings findings;
-  for (std::uint32_t i = 0; i < chunk.count; i += lane_count()) {
-    const M inside =
-        in_ball(load3(chunk.x, chunk.y, chunk.z, i), resident.sphere_centre(), resident.sphere_square());
-    const V infinity = all(std::numeric_limits<float>::infinity()), zero = hn::Zero(kD);
-    hn::Store(pick(inside, hn::Load(kD, chunk.x + i), infinity), kD, chunk.x + i);
-    hn::Store(infinity, kD, findings.nearest + i);
-    hn::Store(all(-1.0F), kD, findings.sharpest + i);
-    hn::Store(zero, kD, findings.nearest_certainty + i);
-    hn::Store(zero, kD, findings.offset + i);
-    hn::Store(hn::Zero(kDI), kDI, findings.flags + i);
-    hn::Store(hn::Set(kDI, -1), kDI, chunk.part + i);
+HWY_NOINLINE void Answerer::hand_over(Findings& findings) noexcept {
+  for (std::uint32_t k = 0; k < findings.count; ++k) {
+    Finding& finding = findings.of[findings.points[k]];
+    const std::int32_t i = finding.nearest_entry;
+    if (i < 0 || (entries_.flags[i] & kWanted) == 0) continue;
     for (int axis = 0; axis < 3; ++axis) {
-      if (wants.normal) hn::Store(zero, kD, chunk.normal[axis] + i);
-      if (wants.surface) hn::Store(zero, kD, chunk.surface_m[axis] + i);
+      finding.normal[axis] = entries_.normal[axis][i];
+      finding.surface[axis] = entries_.surface[axis][i];
     }
+    finding.nearest_entry = -1;
   }
-  PartPoints points;
-  for (std::uint32_t k = 0; k < resident.part_count(); ++k) {
-    const PartRecord& part = resident.part(k);
-    cull(part, chunk, points);
-    if (points.count == 0) continue;
-    first_layer(part, points);
-    if (points.count == 0) continue;
-    const Layer layer = layer_for(part, options);
-    if (layer == Layer::kOne) {
-      answer_first(part, k, points, wants, findings, chunk);
-    } else {
-      answer_deeper(resident, k, points, layer == Layer::kThree, options, wants, findings, chunk);
-    }
-  }
-  conclude(resident, findings, chunk);
 }
 
-HWY_INLINE void store3(const float (&values)[3][kPadded], std::uint32_t count, Vec3f* out) {
-  for (std::uint32_t i = 0; i < count; ++i) out[i] = {values[0][i], values[1][i], values[2][i]};
+// What Object promises of the stack; the rest is a few vectors that did not fit registers.
+static_assert(sizeof(Answerer) + sizeof(Walker) + sizeof(Chunk) + sizeof(Findings) + sizeof(Lost) <=
+              384 * 1024);
+
+/// Default answers.
+inline void clear(const Answers& answers, std::size_t begin, std::size_t count) noexcept {
+  const Answer nothing;
+  const auto fill = [&](const auto& values, auto value) {
+    if (!values.empty()) std::fill_n(values.begin() + static_cast<std::ptrdiff_t>(begin), count, value);
+  };
+  fill(answers.signed_distance_m, nothing.signed_distance_m);
+  fill(answers.normal, nothing.normal);
+  fill(answers.surface_m, nothing.surface_m);
+  fill(answers.part, nothing.part);
+  fill(answers.layer, std::uint8_t{0});
+  fill(answers.inside, std::uint8_t{0});
+}
+inline void put(const Resident& resident, const Finding& finding, const Answers& answers,
+                std::size_t to) noexcept {
+  if (!answers.signed_distance_m.empty())
+    answers.signed_distance_m[to] = finding.signed_distance_m(resident.unit_m());
+  if (!answers.normal.empty()) answers.normal[to] = finding.normal_vector();
+  if (!answers.surface_m.empty()) answers.surface_m[to] = resident.unit_m() * finding.surface_point();
+  if (!answers.part.empty()) answers.part[to] = finding.part;
+  if (!answers.layer.empty()) answers.layer[to] = finding.layer;
+  if (!answers.inside.empty()) answers.inside[to] = finding.is_inside() ? 1 : 0;
 }
 
+/// Object::query(span).
 void query(const Resident& resident, std::span<const Vec3f> points_m, const Answers& answers,
            const QueryOptions& options) noexcept {
-  Chunk chunk;
   Wants wants;
   wants.normal = !answers.normal.empty();
   wants.surface = !answers.surface_m.empty();
+  Chunk chunk;
+  Findings findings;
+  Answerer answerer(resident, options, wants);
   const float scale = resident.units_per_m();
   for (std::size_t begin = 0; begin < points_m.size(); begin += kChunkPoints) {
     const auto count =
@@ -260,18 +330,10 @@ void query(const Resident& resident, std::span<const Vec3f> points_m, const Answ
       chunk.z[i] = p.z;
     }
     for (std::uint32_t i = count; i < count + lane_count(); ++i) chunk.x[i] = chunk.y[i] = chunk.z[i] = 0;
-    answer(resident, options, wants, chunk);
-    if (!answers.signed_distance_m.empty()) {
-      std::copy_n(chunk.signed_distance_m, count, answers.signed_distance_m.data() + begin);
-    }
-    if (wants.normal) store3(chunk.normal, count, answers.normal.data() + begin);
-    if (wants.surface) store3(chunk.surface_m, count, answers.surface_m.data() + begin);
-    const auto copy = [&](const std::int32_t* values, auto& out) {
-      using T = typename std::remove_reference_t<decltype(out)>::value_type;
-      for (std::uint32_t i = 0; i < count && !out.empty(); ++i) out[begin + i] = static_cast<T>(values[i]);
-    };
-    copy(chunk.part, answers.part);
-    copy(chunk.layer, answers.layer);
-    copy(chunk.inside, answers.inside);
+    make_blocks(resident, chunk);
+    answerer.answer(chunk, findings);
+    clear(answers, begin, count);
+    for (std::uint32_t k = 0; k < findings.count; ++k)
+      put(resident, findings.of[findings.points[k]], answers, begin + findings.points[k]);
   }
 }

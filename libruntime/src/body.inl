@@ -35,7 +35,7 @@ class BlockWalker {
     end_ = dot(d, d) <= reach * reach ? body.block_count() : 0;
   }
 
-  /// Fills the chunk with the next blocks that touch the object. False: there are none.
+  /// Fills the chunk with the next blocks that touch a part. False: there are none.
   HWY_NOINLINE bool next(Chunk& chunk) noexcept {
     chunk.block_count = chunk.count = 0;
     for (; next_ < end_; next_ += lane_count()) {
@@ -46,17 +46,24 @@ class BlockWalker {
       const V3 d = centre - all(resident_.sphere_centre());
       const V reach = all(resident_.sphere_radius()) + radius;
       const M near = hn::And(hn::Le(dot3(d, d), reach * reach), hn::FirstN(kD, end_ - next_));
-      const auto count = static_cast<std::uint32_t>(hn::CountTrue(kD, near));
+      if (none(near)) continue;
+      M open = near, touching = hn::Xor(near, near);  // not known to touch a part; known to
+      for (std::uint32_t k = 0; k < resident_.part_count() && !none(open); ++k) {
+        const M touches = reaching(resident_.part(k), centre, radius, open);
+        touching = hn::Or(touching, touches);
+        open = hn::AndNot(touches, open);
+      }
+      const auto count = static_cast<std::uint32_t>(hn::CountTrue(kD, touching));
       if (count == 0) continue;
       if (chunk.block_count + count > kChunkBlocks) return true;
       HWY_ALIGN float values[4][kMostLanes];
       HWY_ALIGN std::int32_t firsts[kMostLanes];
-      hn::Store(hn::Compress(centre.x, near), kD, values[0]);
-      hn::Store(hn::Compress(centre.y, near), kD, values[1]);
-      hn::Store(hn::Compress(centre.z, near), kD, values[2]);
-      hn::Store(hn::Compress(radius, near), kD, values[3]);
+      hn::Store(hn::Compress(centre.x, touching), kD, values[0]);
+      hn::Store(hn::Compress(centre.y, touching), kD, values[1]);
+      hn::Store(hn::Compress(centre.z, touching), kD, values[2]);
+      hn::Store(hn::Compress(radius, touching), kD, values[3]);
       const VI block = hn::Iota(kDI, static_cast<std::int32_t>(next_));
-      hn::Store(hn::Compress(block, hn::RebindMask(kDI, near)), kDI, firsts);
+      hn::Store(hn::Compress(block, hn::RebindMask(kDI, touching)), kDI, firsts);
       for (std::uint32_t k = 0; k < count; ++k) {
         const std::uint32_t slot = chunk.block_count++;
         for (int axis = 0; axis < 3; ++axis) chunk.block_centre[axis][slot] = values[axis][k];
@@ -66,13 +73,6 @@ class BlockWalker {
       }
     }
     return chunk.block_count > 0;
-  }
-
-  /// A point of the body in the object's frame, as place() has it.
-  Vec3f position(std::uint32_t at) const noexcept {
-    const Vec3f p{body_.axis(0)[at], body_.axis(1)[at], body_.axis(2)[at]};
-    return {dot(map_.row[0], p) + map_.translation.x, dot(map_.row[1], p) + map_.translation.y,
-            dot(map_.row[2], p) + map_.translation.z};
   }
 
  private:
@@ -112,30 +112,19 @@ inline std::uint32_t body_place(const Chunk& chunk, std::uint32_t i) noexcept {
 
 void query_body(const Resident& resident, const PointBody::Data& body, const BodyPlacement& placement,
                 const Answers& answers, const QueryOptions& options) noexcept {
-  const Answer nothing;
-  std::fill(answers.signed_distance_m.begin(), answers.signed_distance_m.end(), nothing.signed_distance_m);
-  std::fill(answers.normal.begin(), answers.normal.end(), nothing.normal);
-  std::fill(answers.surface_m.begin(), answers.surface_m.end(), nothing.surface_m);
-  std::fill(answers.part.begin(), answers.part.end(), nothing.part);
-  std::fill(answers.layer.begin(), answers.layer.end(), std::uint8_t{0});
-  std::fill(answers.inside.begin(), answers.inside.end(), std::uint8_t{0});
+  clear(answers, 0, body.point_count);
   Wants wants;
   wants.normal = !answers.normal.empty();
   wants.surface = !answers.surface_m.empty();
   BlockWalker walker(resident, body, placement);
   Chunk chunk;
+  Findings findings;
+  Answerer answerer(resident, options, wants);
   while (walker.next(chunk)) {
-    answer(resident, options, wants, chunk);
-    for (std::uint32_t i = 0; i < chunk.count; ++i) {
-      if (chunk.part[i] < 0) continue;
-      const std::uint32_t to = body.index[body_place(chunk, i)];
-      if (!answers.signed_distance_m.empty()) answers.signed_distance_m[to] = chunk.signed_distance_m[i];
-      if (wants.normal) answers.normal[to] = {chunk.normal[0][i], chunk.normal[1][i], chunk.normal[2][i]};
-      if (wants.surface)
-        answers.surface_m[to] = {chunk.surface_m[0][i], chunk.surface_m[1][i], chunk.surface_m[2][i]};
-      if (!answers.part.empty()) answers.part[to] = static_cast<std::uint32_t>(chunk.part[i]);
-      if (!answers.layer.empty()) answers.layer[to] = static_cast<std::uint8_t>(chunk.layer[i]);
-      if (!answers.inside.empty()) answers.inside[to] = static_cast<std::uint8_t>(chunk.inside[i]);
+    answerer.answer(chunk, findings);
+    for (std::uint32_t k = 0; k < findings.count; ++k) {
+      const std::uint32_t i = findings.points[k];
+      put(resident, findings.of[i], answers, body.index[body_place(chunk, i)]);
     }
   }
 }
@@ -146,19 +135,21 @@ class ContactCollector {
   ContactCollector(const Resident& resident, std::span<Contact> out, const ContactQuery& query) noexcept
       : resident_(resident), out_(out), query_(query) {}
 
-  /// False: no more are wanted. `index` is the caller's, one for each point of the chunk.
-  bool add(const Chunk& chunk, const std::uint32_t* index) noexcept {
-    for (std::uint32_t i = 0; i < chunk.count; ++i) {
-      const float distance_m = chunk.signed_distance_m[i];
+  /// False: no more are wanted.
+  bool add(const Chunk& chunk, const Findings& findings, const PointBody::Data& body) noexcept {
+    for (std::uint32_t k = 0; k < findings.count; ++k) {
+      const std::uint32_t i = findings.points[k];
+      const Finding& finding = findings.of[i];
+      const float distance_m = finding.signed_distance_m(resident_.unit_m());
       const bool unknown = std::isnan(distance_m);
-      if (!(distance_m < query_.within_m) && !(unknown && chunk.inside[i] != 0)) continue;
+      if (!(distance_m < query_.within_m) && !(unknown && finding.is_inside())) continue;
       Contact contact;
-      contact.point = index[i];
-      contact.part = static_cast<std::uint32_t>(chunk.part[i]);
+      contact.point = body.index[body_place(chunk, i)];
+      contact.part = finding.part;
       contact.depth_m = unknown ? 0.0F : -distance_m;
-      contact.normal = {chunk.normal[0][i], chunk.normal[1][i], chunk.normal[2][i]};
+      contact.normal = finding.normal_vector();
       contact.position_m = resident_.unit_m() * Vec3f{chunk.x[i], chunk.y[i], chunk.z[i]};
-      contact.surface_m = {chunk.surface_m[0][i], chunk.surface_m[1][i], chunk.surface_m[2][i]};
+      contact.surface_m = resident_.unit_m() * finding.surface_point();
       if (query_.seek == Seek::kDeepest) {
         const bool better = found_ == 0 || contact.depth_m > deepest_.depth_m ||
                             (contact.depth_m == deepest_.depth_m && contact.point < deepest_.point);
@@ -185,51 +176,44 @@ class ContactCollector {
   Contact deepest_;
 };
 
-std::size_t contacts(const Resident& resident, const PointBody::Data& body, const BodyPlacement& placement,
-                     std::span<Contact> out, const ContactQuery& query) noexcept {
-  ContactCollector collector(resident, out, query);
+/// Sets the deepest layer that the budget affords, and what it will cost.
+HWY_NOINLINE void afford(const Resident& resident, const PointBody::Data& body,
+                         const BodyPlacement& placement, Chunk& chunk, QueryOptions& options,
+                         WorkBudget& budget) noexcept {
+  std::uint64_t blocks = 0, pairs = 0;
+  Answerer answerer(resident, options, {});
   BlockWalker walker(resident, body, placement);
-  Wants wants;
-  wants.normal = wants.surface = true;
-  // First layer 2 alone, to find the points that can be contacts; then those, as they were asked for.
-  Wants first_look;
-  first_look.suspects = true;
-  first_look.reach = resident.units_per_m() * (query.within_m + most_offset(query.options.edge_length_m));
-  QueryOptions coarse = query.options;
-  if (coarse.layer != Layer::kOne) coarse.layer = Layer::kTwo;
-  coarse.edge_length_m = 0;
-
-  Chunk chunk, closer;
-  std::uint32_t index[kPadded];
-  const auto look_closer = [&]() HWY_ATTR {
-    float x[kChunkPoints];
-    const std::uint32_t count = closer.count;
-    for (std::uint32_t i = count; i < count + lane_count(); ++i) closer.x[i] = closer.y[i] = closer.z[i] = 0;
-    std::copy_n(closer.x, count, x);
-    answer(resident, query.options, wants, closer);
-    std::copy_n(x, count, closer.x);  // answer() strikes off what it need not look at
-    const bool more = collector.add(closer, index);
-    closer.count = 0;
-    return more;
-  };
   while (walker.next(chunk)) {
-    answer(resident, coarse, first_look, chunk);
-    for (std::uint32_t i = 0; i < chunk.count; ++i) {
-      if (chunk.suspect[i] == 0) continue;
-      const std::uint32_t k = closer.count++;
-      // The chunk's x may have been struck off; the body knows it.
-      const std::uint32_t at = body_place(chunk, i);
-      const Vec3f p = walker.position(at);
-      closer.x[k] = p.x;
-      closer.y[k] = p.y;
-      closer.z[k] = p.z;
-      index[k] = body.index[at];
-      if (closer.count == kChunkPoints && !look_closer()) return collector.finish();
-    }
-    if (query.seek == Seek::kAny && closer.count > 0 && !look_closer()) return collector.finish();
+    blocks += chunk.block_count;
+    pairs += answerer.pairs(chunk);
   }
-  if (closer.count > 0) look_closer();
+  const auto asked = options.layer == Layer::kAuto ? Layer::kThree : options.layer;
+  auto layer = static_cast<std::uint32_t>(asked);
+  while (layer > 1 && blocks + pairs * kWorkOfLayer[layer - 1] > budget.units) --layer;
+  budget.spent = blocks + pairs * kWorkOfLayer[layer - 1];
+  budget.layer = static_cast<Layer>(layer);
+  budget.level = options.level;
+  if (budget.layer != asked) options.layer = budget.layer;
+}
+
+std::size_t contacts(const Resident& resident, const PointBody::Data& body, const BodyPlacement& placement,
+                     std::span<Contact> out, const ContactQuery& query, WorkBudget* budget) noexcept {
+  ContactCollector collector(resident, out, query);
+  Wants wants;
+  wants.normal = wants.surface = wants.contacts = true;
+  wants.within_m = query.within_m;
+  wants.reach = resident.units_per_m() * (query.within_m + most_offset(query.options.edge_length_m));
+  QueryOptions options = query.options;
+  Chunk chunk;
+  if (budget != nullptr) afford(resident, body, placement, chunk, options, *budget);
+  BlockWalker walker(resident, body, placement);
+  Findings findings;
+  Answerer answerer(resident, options, wants);
+  while (walker.next(chunk)) {
+    answerer.answer(chunk, findings);
+    if (!collector.add(chunk, findings, body)) break;
+  }
   return collector.finish();
 }
 
-const Kernels kKernels{answer, query, query_body, contacts};
+const Kernels kKernels{query, query_body, contacts};

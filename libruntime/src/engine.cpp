@@ -7,12 +7,14 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
+#include <bit>
 #include <cmath>
 #include <cstring>
 #include <limits>
 
 #include "body_data.hpp"
 #include "chart.hpp"
+#include "entries.hpp"
 
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
 #define SQMAP_SANITIZED
@@ -47,6 +49,12 @@ namespace hn = hwy::HWY_NAMESPACE;
 #include "lanes.inl"
 //
 #include "look.inl"
+//
+#include "walk.inl"
+//
+#include "fans.inl"
+//
+#include "cull.inl"
 //
 #include "batch.inl"
 //

@@ -42,6 +42,17 @@ HWY_INLINE V3 cross3(const V3& a, const V3& b) {
 HWY_INLINE V3 pick(M mask, const V3& yes, const V3& no) {
   return {pick(mask, yes.x, no.x), pick(mask, yes.y, no.y), pick(mask, yes.z, no.z)};
 }
+HWY_INLINE V3 load3(const float* x, const float* y, const float* z, std::uint32_t i) {
+  return {hn::LoadU(kD, x + i), hn::LoadU(kD, y + i), hn::LoadU(kD, z + i)};
+}
+/// One bit a lane.
+HWY_INLINE std::uint32_t bits_of(M mask) {
+  HWY_ALIGN std::uint8_t bytes[8] = {};
+  hn::StoreMaskBits(kD, mask, bytes);
+  std::uint32_t bits;
+  std::memcpy(&bits, bytes, sizeof bits);
+  return bits;
+}
 HWY_INLINE V3 all(const Vec3f& a) { return {all(a.x), all(a.y), all(a.z)}; }
 /// 1/|a|, or 0 where |a| is zero.
 HWY_INLINE V inverse_length(const V3& a) {
@@ -75,6 +86,28 @@ SQMAP_KERNEL V exp2_of(V x) {
   return hn::BitCast(kD, hn::BitCast(kDI, series) + hn::ShiftLeft<23>(n));
 }
 HWY_INLINE V power_of(V x, float k) { return exp2_of(all(k) * log2_of(x)); }
+
+/// shape_normal() of chart.hpp.
+SQMAP_KERNEL V3 shape_normal_of(const PartRecord& part, const V3& p) {
+  const V zero = hn::Zero(kD), one = all(1.0F);
+  const V bx = all(part.inverse_axes.x), by = all(part.inverse_axes.y), bz = all(part.inverse_axes.z);
+  const V x = hn::Abs(p.x) * bx, y = hn::Abs(p.y) * by, z = hn::Abs(p.z) * bz;
+  const V more = most(x, y);
+  const M off_axis = hn::Gt(more, zero);
+  const V divisor = pick(off_axis, more, one);
+  const V u_x = x / divisor, u_y = y / divisor;
+  const V size = power_of(power_of(u_x, part.power_2) + power_of(u_y, part.power_2), 1 / part.power_2);
+  const V u = hn::IfThenElseZero(off_axis, more * size);
+  const V normal_x = hn::IfThenElseZero(off_axis, power_of(u_x / size, part.power_2 - 1));
+  const V normal_y = hn::IfThenElseZero(off_axis, power_of(u_y / size, part.power_2 - 1));
+  const V scale = most(u, z);
+  const M known = hn::Gt(scale, zero);
+  const V whole = pick(known, scale, one);
+  const V rim = power_of(u / whole, part.power_1 - 1);
+  const V3 n{hn::CopySign(rim * normal_x * bx, p.x), hn::CopySign(rim * normal_y * by, p.y),
+             hn::CopySign(power_of(z / whole, part.power_1 - 1) * bz, p.z)};
+  return pick(known, normalized3(n), V3{zero, zero, zero});
+}
 
 /// table[k] for k in [0, 31].
 HWY_INLINE V lookup(const float* table, VI k) {

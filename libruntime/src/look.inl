@@ -1,14 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Chart (chart.hpp) for a vector of points: layers 2 and 3. What few points need (further sheets of a ray,
-// fans of vertex samples, the offset of faces) is left to Chart itself, a point at a time.
+// Layer 2 of Chart (chart.hpp) for a vector of points. Further sheets of a ray, which few points need, are
+// read a point at a time.
 
-/// What the lanes of one vector know: ChartAnswer.
+/// What layer 2 knows of the lanes of one vector.
 struct Look {
-  M inside, faces_patch;
-  M within;  // Wants::reach: layer 2 cannot rule out that the surface is so near
-  V certainty, distance, row, col;
-  V3 surface, normal;
+  V row, col, crossing, distance, certainty;
+  VI flags;
 };
 
 struct VCell {
@@ -31,35 +29,28 @@ class Looker {
       : resident_(resident),
         part_(part),
         chart_(chart),
-        level_(level),
         stride_(part.stride_at(level)),
         last_row_(static_cast<float>(part.rows - 1)),
         turn_(static_cast<float>(part.cols)),
         size_(static_cast<float>(stride_)),
         inverse_size_(1.0F / size_) {}
 
-  SQMAP_KERNEL Look look(const V3& p, M wanted, bool third, const Wants& wants) const noexcept {
-    const VFoot foot = foot_of(chart_.table(), p);
-    M behind;
-    Look second = second_layer(foot, wanted, third, wants, behind);
-    if (!third) return second;
-    M eligible = hn::And(wanted, hn::Lt(second.distance, all(std::numeric_limits<float>::infinity())));
-    const M lost = hn::AndNot(eligible, hn::And(wanted, second.inside));
-    if (!none(lost)) eligible = hn::Or(eligible, start_beside(lost, p, second));
-    if (none(eligible)) return second;
-    const Look refined = third_layer(p, second.row, second.col, eligible, wants);
-    const M better =
-        hn::And(eligible, hn::Not(hn::AndNot(hn::Lt(refined.distance, second.distance), behind)));
-    second.distance = pick(better, refined.distance, second.distance);
-    second.row = pick(better, refined.row, second.row);
-    second.col = pick(better, refined.col, second.col);
-    second.faces_patch = hn::And(better, refined.faces_patch);
-    if (wants.surface) second.surface = pick(better, refined.surface, second.surface);
-    if (wants.normal) second.normal = pick(better, refined.normal, second.normal);
-    return second;
+  /// Layer 2. Wants::reach decides about kWithin.
+  SQMAP_KERNEL Look look(const V3& p, M wanted, float reach) const noexcept;
+  /// Where layer 2 says the surface is, and its normal there.
+  HWY_INLINE V3 surface_at(V row, V col, V crossing) const noexcept {
+    const Sample r = sample_at(chart_.table(), row, col);
+    return r.point - crossing * r.normal;
   }
+  HWY_INLINE V3 normal_at(V row, V col, M leaving) const noexcept {
+    VCell cell = cell_at(row, col);
+    read(cell);
+    return pick(leaving, all(-1.0F), all(1.0F)) * patch_normal(cell, row, col);
+  }
+  const Chart& chart() const noexcept { return chart_; }
 
- private:
+  // What Walker builds on.
+
   HWY_INLINE VCell cell_of(VI row, VI col) const noexcept {
     VCell cell;
     cell.row = row;
@@ -86,17 +77,28 @@ class Looker {
   SQMAP_KERNEL Corners read(VCell& cell) const noexcept {
     const std::uint8_t* base = resident_.bytes() + part_.texels_at;
     const VU mask = hn::Set(kDU, (1U << part_.texel_bits) - 1U);
+    const auto word_at = [&](VI texel) HWY_ATTR {
+      const VI bit = texel * all_int(part_.texel_bits);
+      return gather_bytes(base, hn::ShiftRight<3>(bit)) >> hn::And(hn::BitCast(kDU, bit), hn::Set(kDU, 7U));
+    };
     Corners corners;
-    corners.eligible = as_float(hn::Eq(hn::Zero(kDI), hn::Zero(kDI)));
-    for (int k = 0; k < 4; ++k) {
-      const VI bit = cell.texel[k] * all_int(part_.texel_bits);
-      const VU word = gather_bytes(base, hn::ShiftRight<3>(bit));
-      const VU shifted = word >> hn::And(hn::BitCast(kDU, bit), hn::Set(kDU, 7U));
-      corners.texel[k] = hn::BitCast(kDI, hn::And(shifted, mask));
-      corners.eligible =
-          hn::And(corners.eligible, as_float(hn::Lt(corners.texel[k], all_int(part_.miss_code))));
-      cell.depth[k] = depth_of(hn::And(corners.texel[k], all_int(part_.miss_code)));
+    // Two neighbours fit one word where no lane's cell lies across the seam of the columns.
+    const M torn = as_float(hn::Ne(cell.texel[1], cell.texel[0] + all_int(1)));
+    if (part_.texel_bits <= 12 && none(torn)) {
+      for (int k = 0; k < 4; k += 2) {
+        const VU both = word_at(cell.texel[k]);
+        corners.texel[k] = hn::BitCast(kDI, hn::And(both, mask));
+        const VU second = both >> hn::Set(kDU, part_.texel_bits);
+        corners.texel[k + 1] = hn::BitCast(kDI, hn::And(second, mask));
+      }
+    } else {
+      for (int k = 0; k < 4; ++k) corners.texel[k] = hn::BitCast(kDI, hn::And(word_at(cell.texel[k]), mask));
     }
+    const VI miss = all_int(part_.miss_code);
+    const VI highest =
+        hn::Max(hn::Max(corners.texel[0], corners.texel[1]), hn::Max(corners.texel[2], corners.texel[3]));
+    corners.eligible = as_float(hn::Lt(highest, miss));
+    for (int k = 0; k < 4; ++k) cell.depth[k] = depth_of(hn::And(corners.texel[k], miss));
     return corners;
   }
   SQMAP_KERNEL VPatch patch_at(const VCell& cell, V row, V col) const noexcept {
@@ -123,23 +125,26 @@ class Looker {
     return hn::RebindMask(kD, hn::Ne(bit, hn::Zero(kDU)));
   }
 
-  SQMAP_KERNEL Look second_layer(const VFoot& foot, M wanted, bool third, const Wants& wants,
-                                 M& behind) const noexcept;
-  HWY_NOINLINE M start_beside(M lanes, const V3& p, Look& look) const noexcept;
-  HWY_NOINLINE Look third_layer(const V3& p, V row, V col, M active, const Wants& wants) const noexcept;
+  const Resident& resident() const noexcept { return resident_; }
+  const PartRecord& part() const noexcept { return part_; }
+  std::uint32_t stride() const noexcept { return stride_; }
+  float size() const noexcept { return size_; }
+  float last_row() const noexcept { return last_row_; }
+  float turn() const noexcept { return turn_; }
+
+ private:
   HWY_NOINLINE void further_sheets(M lanes, VI texel, V shift, V depth, V& gap, V& crossing, V& inside,
                                    V& leaving, V& later) const noexcept;
-  HWY_NOINLINE void vertex_fans(M lanes, const V3& p, const VCell& cell, Look& look) const noexcept;
 
   const Resident& resident_;
   const PartRecord& part_;
   const Chart& chart_;
-  std::uint32_t level_, stride_;
+  std::uint32_t stride_;
   float last_row_, turn_, size_, inverse_size_;
 };
 
-SQMAP_KERNEL Look Looker::second_layer(const VFoot& foot, M wanted, bool third, const Wants& wants,
-                                       M& behind) const noexcept {
+SQMAP_KERNEL Look Looker::look(const V3& p, M wanted, float reach) const noexcept {
+  const VFoot foot = foot_of(chart_.table(), p);
   const V zero = hn::Zero(kD), one = all(1.0F), half = all(0.5F);
   VCell cell = cell_at(foot.row, foot.col);
   const Corners corners = read(cell);
@@ -180,30 +185,19 @@ SQMAP_KERNEL Look Looker::second_layer(const VFoot& foot, M wanted, bool third, 
       inside = hn::Gt(inside_number, half);
     }
   }
-  behind = hn::Gt(later, half);
-
+  const auto flag = [](M mask, std::int32_t bit)
+                        HWY_ATTR { return pick(mask, hn::Set(kDI, bit), hn::Zero(kDI)); };
   Look look;
-  look.inside = inside;
-  look.faces_patch = hn::Lt(one, zero);
-  look.within = hn::Lt(all(part_.depth_min) - foot.depth, all(wants.reach));
-  if (!(wants.reach > 0)) look.within = look.faces_patch;  // none
-  const V reach = pick(as_float(mixed), most(foot.depth, zero), all(part_.sphere_radius));
-  look.certainty = least(gap, reach) / most(doubt, all(kLeastDoubt * part_.sphere_radius));
+  look.flags = hn::Or(hn::Or(flag(inside, kInside), flag(hn::Gt(later, half), kBehind)),
+                      hn::Or(flag(hn::Gt(leaving, half), kLeaving), flag(corners.eligible, kPatch)));
+  if (reach > 0)
+    look.flags = hn::Or(look.flags, flag(hn::Lt(all(part_.depth_min) - foot.depth, all(reach)), kWithin));
+  const V sure = pick(as_float(mixed), most(foot.depth, zero), all(part_.sphere_radius));
+  look.certainty = least(gap, sure) / most(doubt, all(kLeastDoubt * part_.sphere_radius));
   look.distance = pick(corners.eligible, gap, all(std::numeric_limits<float>::infinity()));
   look.row = foot.row;
   look.col = foot.col;
-  look.surface = look.normal = {zero, zero, zero};
-  // Layer 3 replaces the place and the normal, unless the crossing is one behind the first.
-  const M kept = third ? hn::And(wanted, behind) : wanted;
-  if (none(hn::And(kept, corners.eligible))) return look;
-  if (wants.surface) {
-    const Sample r = sample_at(chart_.table(), foot.row, foot.col);
-    look.surface = r.point - crossing * r.normal;
-  }
-  if (wants.normal) {
-    const V side = pick(hn::Gt(leaving, half), all(-1.0F), one);
-    look.normal = side * patch_normal(cell, foot.row, foot.col);
-  }
+  look.crossing = crossing;
   return look;
 }
 
@@ -241,135 +235,4 @@ HWY_NOINLINE void Looker::further_sheets(M lanes, VI texel, V shift, V depth, V&
   inside = hn::Load(kD, insides);
   leaving = hn::Load(kD, leavings);
   later = hn::Load(kD, laters);
-}
-
-/// Chart::patch_beside for some lanes: those that found a patch, and its place in `look`.
-HWY_NOINLINE M Looker::start_beside(M lanes, const V3& p, Look& look) const noexcept {
-  HWY_ALIGN float wanted[kMostLanes], x[kMostLanes], y[kMostLanes], z[kMostLanes], row[kMostLanes],
-      col[kMostLanes];
-  hn::Store(hn::IfThenElseZero(lanes, all(1.0F)), kD, wanted);
-  hn::Store(p.x, kD, x);
-  hn::Store(p.y, kD, y);
-  hn::Store(p.z, kD, z);
-  hn::Store(look.row, kD, row);
-  hn::Store(look.col, kD, col);
-  for (std::uint32_t lane = 0; lane < lane_count(); ++lane) {
-    if (wanted[lane] > 0 && !chart_.patch_beside({x[lane], y[lane], z[lane]}, level_, row[lane], col[lane]))
-      wanted[lane] = 0;
-  }
-  look.row = hn::Load(kD, row);
-  look.col = hn::Load(kD, col);
-  return hn::Gt(hn::Load(kD, wanted), hn::Zero(kD));
-}
-
-HWY_NOINLINE Look Looker::third_layer(const V3& p, V row, V col, M active,
-                                      const Wants& wants) const noexcept {
-  const V zero = hn::Zero(kD), one = all(1.0F);
-  const M asked = active;
-  VCell cell = cell_at(row, col);
-  read(cell);
-  const V last_row = all(last_row_), turn = all(turn_), most_row = all(size_);
-  const V last_col = all(std::nextafter(turn_, 0.0F));
-  V best_square = all(std::numeric_limits<float>::infinity()), best_row = row, best_col = col;
-  VI best_cell_row = cell.row, best_cell_col = cell.col;
-  V3 best_point{zero, zero, zero};
-  M on_rim = hn::Lt(one, zero), best_on_rim = on_rim;
-  for (int step = 0; step <= kThirdLayerSteps; ++step) {
-    const VPatch patch = patch_at(cell, row, col);
-    const V3 error = p - patch.point;
-    const V square = dot3(error, error);
-    const M better = hn::And(active, hn::Lt(square, best_square));
-    best_square = pick(better, square, best_square);
-    best_point = pick(better, patch.point, best_point);
-    best_row = pick(better, row, best_row);
-    best_col = pick(better, col, best_col);
-    best_cell_row = pick(better, cell.row, best_cell_row);
-    best_cell_col = pick(better, cell.col, best_cell_col);
-    best_on_rim = hn::Or(hn::And(better, on_rim), hn::AndNot(better, best_on_rim));
-
-    const V a = dot3(patch.row, patch.row), b = dot3(patch.row, patch.col), c = dot3(patch.col, patch.col);
-    const V f = dot3(patch.row, error), g = dot3(patch.col, error);
-    const V product = a * c, determinant = product - b * b;
-    const M regular = hn::Gt(determinant, all(kLeastAngle) * product);
-    const M rows_only = hn::AndNot(regular, hn::Gt(a, zero));
-    const V inverse = one / pick(regular, determinant, pick(rows_only, a, one));
-    const V d_row_free = pick(regular, (c * f - b * g) * inverse, hn::IfThenElseZero(rows_only, f * inverse));
-    const V d_col_free = hn::IfThenElseZero(regular, (a * g - b * f) * inverse);
-    const V slimness =
-        hn::Sqrt(a / most(most(c, all(kLeastAngle) * a), all(std::numeric_limits<float>::min())));
-    const V most_col = least(all(turn_ * 0.125F), most_row * most(slimness, one));
-    const V d_row = limited(d_row_free, hn::Neg(most_row), most_row);
-    const V d_col = limited(d_col_free, hn::Neg(most_col), most_col);
-    active = hn::AndNot(hn::Lt(hn::Abs(d_row) + hn::Abs(d_col), all(kLeastCellStep)), active);
-    if (none(active)) break;
-
-    const V next_row = limited(row + d_row, zero, last_row);
-    const V moved = col + d_col;
-    const V raised = pick(hn::Lt(moved, zero), moved + turn, moved);
-    const V next_col = pick(hn::Lt(raised, turn), raised, raised - turn);
-    VCell next = cell_at(next_row, next_col);
-    const M moves = read(next).eligible;
-    on_rim = hn::Not(moves);
-    const V low_row = to_float(cell.row), low_col = to_float(cell.col);
-    const V rim_row = limited(row + d_row, low_row, low_row + most_row);
-    const V rim_col = limited(moved, low_col, low_col + most_row);
-    const M stays = hn::Lt(hn::Abs(rim_row - row) + hn::Abs(rim_col - col), all(kLeastCellStep));
-    active = hn::AndNot(hn::And(on_rim, stays), active);
-    row = pick(moves, next_row, rim_row);
-    col = pick(moves, next_col, least(rim_col, last_col));
-    cell.row = pick(moves, next.row, cell.row);
-    cell.col = pick(moves, next.col, cell.col);
-    for (int k = 0; k < 4; ++k) cell.depth[k] = pick(moves, next.depth[k], cell.depth[k]);
-    if (none(active)) break;
-  }
-  Look look;
-  look.inside = look.within = best_on_rim;
-  look.faces_patch = hn::Not(best_on_rim);
-  look.certainty = zero;
-  look.distance = hn::Sqrt(best_square);
-  look.surface = best_point;
-  look.row = best_row;
-  look.col = best_col;
-  look.normal = {zero, zero, zero};
-  const bool fans = stride_ == 1 && part_.fans.count > 0;
-  if (!wants.normal && !fans) return look;
-  VCell best_cell = cell_of(best_cell_row, best_cell_col);
-  read(best_cell);
-  if (wants.normal) look.normal = patch_normal(best_cell, best_row, best_col);
-  if (fans) {
-    const M held = hn::And(asked, block_holds(part_.fans, best_cell.texel[0]));
-    if (!none(held)) vertex_fans(held, p, best_cell, look);
-  }
-  return look;
-}
-
-HWY_NOINLINE void Looker::vertex_fans(M lanes, const V3& p, const VCell& cell, Look& look) const noexcept {
-  HWY_ALIGN float wanted[kMostLanes], x[kMostLanes], y[kMostLanes], z[kMostLanes], row[kMostLanes],
-      col[kMostLanes], distance[kMostLanes], surface[3][kMostLanes], normal[3][kMostLanes];
-  hn::Store(hn::IfThenElseZero(lanes, all(1.0F)), kD, wanted);
-  hn::Store(p.x, kD, x);
-  hn::Store(p.y, kD, y);
-  hn::Store(p.z, kD, z);
-  hn::Store(to_float(cell.row), kD, row);
-  hn::Store(to_float(cell.col), kD, col);
-  hn::Store(look.distance, kD, distance);
-  hn::Store(look.surface.x, kD, surface[0]);
-  hn::Store(look.surface.y, kD, surface[1]);
-  hn::Store(look.surface.z, kD, surface[2]);
-  hn::Store(look.normal.x, kD, normal[0]);
-  hn::Store(look.normal.y, kD, normal[1]);
-  hn::Store(look.normal.z, kD, normal[2]);
-  for (std::uint32_t lane = 0; lane < lane_count(); ++lane) {
-    if (!(wanted[lane] > 0)) continue;
-    ChartAnswer answer;
-    if (!chart_.vertex_fan_at({x[lane], y[lane], z[lane]}, row[lane], col[lane], answer)) continue;
-    distance[lane] = answer.distance;
-    for (int axis = 0; axis < 3; ++axis) {
-      surface[axis][lane] = answer.surface[axis];
-      normal[axis][lane] = answer.normal[axis];
-    }
-  }
-  look.distance = hn::Load(kD, distance);
-  look.surface = {hn::Load(kD, surface[0]), hn::Load(kD, surface[1]), hn::Load(kD, surface[2])};
-  look.normal = {hn::Load(kD, normal[0]), hn::Load(kD, normal[1]), hn::Load(kD, normal[2])};
 }

@@ -69,7 +69,10 @@ Answer Object::query(const Vec3f& p_m, const QueryOptions& options) const noexce
       answer.normal = part.object_from_part.apply(shape_normal(part, p_part));
       return answer;
     }
-    const ChartAnswer here = Chart(resident, part).look(p_part, layer == Layer::kThree, options.level, edge);
+    ShapeTable<float> table;
+    resident.unpack(part, table);
+    const ChartAnswer here =
+        Chart(resident, part, table).look(p_part, layer == Layer::kThree, options.level, edge);
     if (here.certainty > sharpest) {
       sharpest = here.certainty;
       answer.inside = here.inside;
@@ -105,7 +108,13 @@ void Object::query(const PointBody& body, const BodyPlacement& placement, const 
 
 std::size_t Object::contacts(const PointBody& body, const BodyPlacement& placement,
                              std::span<Contact> contacts, const ContactQuery& query) const noexcept {
-  return kernels().contacts(impl_->resident, body.data(), placement, contacts, query);
+  return kernels().contacts(impl_->resident, body.data(), placement, contacts, query, nullptr);
+}
+
+std::size_t Object::contacts(const PointBody& body, const BodyPlacement& placement,
+                             std::span<Contact> contacts, const ContactQuery& query,
+                             WorkBudget& budget) const noexcept {
+  return kernels().contacts(impl_->resident, body.data(), placement, contacts, query, &budget);
 }
 
 std::size_t Object::part_count() const noexcept { return impl_->resident.part_count(); }

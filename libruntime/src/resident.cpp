@@ -138,6 +138,13 @@ void unpack_curve(const PackedCurve& curve, const CurveUnits& units, CurveTable<
   }
 }
 
+/// A little more than the squared radius: whatever rounding does to it and to layer 1, no point of the
+/// superquadrics within lies beyond.
+float square_of_ball(const BoundingSphere& sphere, double units_per_m) {
+  const double radius = units_per_m * (sphere.radius_m * (1 + 1e-5) + 1e-6 * norm(sphere.centre_m));
+  return rounded_up(radius * radius);
+}
+
 PartRecord put_part(Layout& out, const Part& part, double units_per_m) {
   const DistanceMap& map = part.map;
   PartRecord record;
@@ -146,11 +153,12 @@ PartRecord put_part(Layout& out, const Part& part, double units_per_m) {
   record.power_1 = static_cast<float>(2 / part.shape.e1);
   record.power_2 = static_cast<float>(2 / part.shape.e2);
   record.power_ratio = static_cast<float>(part.shape.e2 / part.shape.e1);
+  record.slabs = Slabs::of(record.inverse_axes, part.shape.e1, part.shape.e2);
   record.object_from_part = rotation<float>(part.object_from_part.orientation);
   record.translation = cast<float>(units_per_m * part.object_from_part.translation_m);
   record.sphere_centre = cast<float>(units_per_m * part.sphere.centre_m);
   record.sphere_radius = rounded_up(units_per_m * part.sphere.radius_m);
-  record.sphere_square = record.sphere_radius * record.sphere_radius;
+  record.sphere_square = square_of_ball(part.sphere, units_per_m);
   record.depth_min = static_cast<float>(units_per_m * map.depth_min_m);
   record.depth_step = static_cast<float>(units_per_m * map.depth_step_m);
   record.rows = map.rows;
@@ -191,6 +199,25 @@ PartRecord put_part(Layout& out, const Part& part, double units_per_m) {
 
 }  // namespace
 
+Slabs Slabs::of(const Vec3f& inverse_axes, double e1, double e2) noexcept {
+  constexpr double kSlack = 1 + 1e-4;
+  // Dual to the norm with p = 2/e is that with q = 2/(2 - e): |(u, v)|_q, the larger of the two for e = 2.
+  const auto dual = [](double u, double v, double e) {
+    const double most = std::max(u, v), least = std::min(u, v), k = (2 - e) / 2;
+    return k > 0 ? most * std::pow(1 + std::pow(least / most, 1 / k), k) : most;
+  };
+  const double across = dual(1, 1, e2);
+  const auto b = cast<double>(inverse_axes);
+  const auto reach = [](const Vec3d& direction) { return rounded_up(kSlack * norm(direction)); };
+  return {rounded_up(kSlack * across),
+          rounded_up(kSlack * dual(1, 1, e1)),
+          rounded_up(kSlack * dual(across, 1, e1)),
+          reach({b.x, b.y, 0}),
+          reach({b.x, 0, b.z}),
+          reach({0, b.y, b.z}),
+          reach(b)};
+}
+
 float rounded_up(double value) noexcept {
   const float rounded = static_cast<float>(value);
   return rounded < value ? std::nextafter(rounded, std::numeric_limits<float>::infinity()) : rounded;
@@ -204,6 +231,7 @@ Resident::Resident(const Asset& asset) : part_count_(static_cast<std::uint32_t>(
   const double units_per_m = 1 / double{unit_m_};
   sphere_centre_ = cast<float>(units_per_m * asset.sphere.centre_m);
   sphere_radius_ = rounded_up(units_per_m * asset.sphere.radius_m);
+  sphere_square_ = square_of_ball(asset.sphere, units_per_m);
   const std::vector<PartRecord> blank(part_count_);
   const auto lay_out = [&](Layout& out) {
     out.put(blank.data(), blank.size() * sizeof(PartRecord));

@@ -40,14 +40,28 @@ struct CurveUnits {
   float c{}, s{}, c_step{}, s_step{};
 };
 
+/// Planes that bound a superquadric besides its box. With w = |p| / semi_axes, for every p in it:
+///
+///     w_x + w_y <= across,    w_x + w_z <= up,    w_y + w_z <= up,    w_x + w_y + w_z <= diagonal
+///
+/// These are the values of its support function in the directions 1/a, the dual norms of (1, 1) and (1, 1,
+/// 1); rounded up by far more than layer 1 errs.
+struct Slabs {
+  float across{}, up{}, diagonal{};
+  /// How much a ball of radius 1 reaches beyond its centre in these sums: x + y, x + z, y + z, x + y + z.
+  float across_reach{}, up_x_reach{}, up_y_reach{}, diagonal_reach{};
+  static Slabs of(const Vec3f& inverse_axes, double e1, double e2) noexcept;
+};
+
 /// One part. Lengths in units of Resident::unit_m; byte offsets count from the start of the allocation.
 struct PartRecord {
   Vec3f semi_axes, inverse_axes;
   float power_1{}, power_2{}, power_ratio{};  ///< 2/e1, 2/e2, e2/e1
+  Slabs slabs;
   Rotation<float> object_from_part;
   Vec3f translation;
-  Vec3f sphere_centre;  ///< object frame
-  float sphere_radius{}, sphere_square{};
+  Vec3f sphere_centre;                     ///< object frame
+  float sphere_radius{}, sphere_square{};  ///< the square is that of a slightly larger ball
   float depth_min{}, depth_step{};
   CurveUnits eta_units, omega_units;
   std::uint32_t rows{}, cols{}, vertex_count{};
@@ -82,7 +96,8 @@ class Resident {
   float unit_m() const noexcept { return unit_m_; }
   float units_per_m() const noexcept { return 1 / unit_m_; }
   const Vec3f& sphere_centre() const noexcept { return sphere_centre_; }  ///< of the object, in units
-  float sphere_square() const noexcept { return sphere_radius_ * sphere_radius_; }
+  /// Of a ball that surely holds whatever layer 1 calls inside.
+  float sphere_square() const noexcept { return sphere_square_; }
   float sphere_radius() const noexcept { return sphere_radius_; }
   std::uint32_t part_count() const noexcept { return part_count_; }
   const PartRecord& part(std::uint32_t index) const noexcept { return parts()[index]; }
@@ -127,7 +142,7 @@ class Resident {
   std::uint32_t part_count_{};
   float unit_m_{1};
   Vec3f sphere_centre_;
-  float sphere_radius_{};
+  float sphere_radius_{}, sphere_square_{};
 };
 
 /// The next float at or above a double.

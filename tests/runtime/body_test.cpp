@@ -10,6 +10,7 @@
 
 #include <gtest/gtest.h>
 
+#include "sqmap/runtime/budget.hpp"
 #include "sqmap/runtime/contact.hpp"
 #include "sqmap/runtime/object.hpp"
 
@@ -226,6 +227,81 @@ TEST(Body, HoldsEveryPointInABlockOfNeighbours) {
   for (const Vec3f& p : points) most = std::max(most, norm(p - body.sphere_centre_m()));
   EXPECT_GE(body.sphere_radius_m(), most);
   EXPECT_LE(body.sphere_radius_m(), 1.1F * most);
+}
+
+TEST(Budget, AffordsTheDeepestLayerWithinItAndSaysSo) {
+  const std::vector<Vec3f> points = cloud(1500, 41);
+  const PointBody body = built(points);
+  int deeper = 0;
+  for (const BodyPlacement& placement : placements(1)) {
+    ContactQuery query;
+    query.options.layer = Layer::kThree;
+    query.within_m = 0.05F;
+    WorkBudget all{.units = 1U << 30};
+    std::vector<Contact> found(points.size()), expected(points.size());
+    object().contacts(body, placement, found, query, all);
+    ASSERT_EQ(all.layer, Layer::kThree);
+    ASSERT_LE(all.spent, all.units);
+    Layer last = Layer::kThree;
+    for (std::uint64_t units = all.spent;; units = units * 3 / 4) {
+      WorkBudget budget{.units = units};
+      const std::size_t count = object().contacts(body, placement, found, query, budget);
+      ASSERT_LE(budget.layer, last) << "less to spend looked closer";
+      ASSERT_TRUE(budget.spent <= units || budget.layer == Layer::kOne);
+      deeper += budget.layer != last;
+      last = budget.layer;
+      ContactQuery fixed = query;
+      fixed.options.layer = budget.layer;
+      ASSERT_EQ(object().contacts(body, placement, expected, fixed), count);
+      for (std::size_t k = 0; k < count; ++k) {
+        ASSERT_EQ(found[k].point, expected[k].point);
+        ASSERT_EQ(found[k].depth_m, expected[k].depth_m);
+        ASSERT_EQ(found[k].normal, expected[k].normal);
+      }
+      if (units == 0) break;
+    }
+  }
+  EXPECT_GT(deeper, 10) << "the placements hardly touch";
+}
+
+TEST(Budget, CostsTheSameOnEveryInstructionSetAndNothingFarAway) {
+  const PointBody body = built(cloud(1500, 42));
+  const SimdTarget before = simd_target();
+  BodyPlacement far;
+  far.object_from_body.translation_m = {50, 0, 0};
+  for (const SimdTarget target :
+       {SimdTarget::kBaseline, SimdTarget::kSse4, SimdTarget::kAvx2, SimdTarget::kAvx512}) {
+    if (!set_simd_target(target)) continue;
+    for (const BodyPlacement& placement : placements(1)) {
+      WorkBudget here{.units = 5000}, there{.units = 5000};
+      object().contacts(body, placement, {}, {}, here);
+      set_simd_target(before);
+      object().contacts(body, placement, {}, {}, there);
+      set_simd_target(target);
+      ASSERT_EQ(here.spent, there.spent);
+      ASSERT_EQ(here.layer, there.layer);
+    }
+    WorkBudget nothing;
+    EXPECT_EQ(object().contacts(body, far, {}, {}, nothing), 0U);
+    EXPECT_EQ(nothing.spent, 0U);
+    EXPECT_EQ(nothing.layer, Layer::kThree) << "what costs nothing is always afforded";
+  }
+  set_simd_target(before);
+}
+
+TEST(Budget, RateFollowsSlowFramesFasterThanFastOnes) {
+  WorkRate rate(100);
+  rate.learn(1000, 20);  // 50 units a microsecond
+  EXPECT_DOUBLE_EQ(rate.units_per_us(), 75);
+  rate.learn(1000, 1000.0 / 91);
+  EXPECT_NEAR(rate.units_per_us(), 76, 1e-9);
+  for (const double took_us : {0.0, -1.0, std::numeric_limits<double>::quiet_NaN()})
+    rate.learn(1000, took_us);
+  rate.learn(3, 1e9);
+  EXPECT_NEAR(rate.units_per_us(), 76, 1e-9) << "frames that say nothing changed it";
+  EXPECT_EQ(rate.units_for(10), 760U);
+  EXPECT_EQ(rate.units_for(std::numeric_limits<double>::quiet_NaN()), 0U);
+  EXPECT_GT(rate.units_for(std::numeric_limits<double>::infinity()), 1U << 30);
 }
 
 TEST(Body, EveryInstructionSetFindsTheSameContacts) {

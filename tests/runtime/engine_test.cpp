@@ -192,6 +192,34 @@ TEST(Engine, FirstLayerAgreesWithTheExactFunction) {
   }
 }
 
+// The planes must hold the whole superquadric, or points are lost; and touch it, or they cull nothing.
+TEST(Engine, SlabsTouchTheSuperquadricFromOutside) {
+  std::mt19937_64 rng(27);
+  std::uniform_real_distribution<double> angle(0, std::acos(0.0));
+  for (const double e1 : {0.1, 0.5, 1.0, 1.6, 2.0}) {
+    for (const double e2 : {0.1, 0.7, 1.0, 2.0}) {
+      const Vec3d a{0.5, 0.3, 0.8};
+      const Slabs slabs = Slabs::of({2, static_cast<float>(1 / 0.3), 1.25F}, e1, e2);
+      double across = 0, up = 0, diagonal = 0;
+      for (int i = 0; i < 40000; ++i) {
+        const double eta = angle(rng), omega = angle(rng);
+        const Vec3d d{std::cos(eta) * std::cos(omega) * a.x, std::cos(eta) * std::sin(omega) * a.y,
+                      std::sin(eta) * a.z};
+        const Vec3d r = (1 / inside_outside_radial({a, e1, e2}, d)) * d;
+        const Vec3d w{r.x / a.x, r.y / a.y, r.z / a.z};
+        across = std::max(across, w.x + w.y);
+        up = std::max(up, std::max(w.x, w.y) + w.z);
+        diagonal = std::max(diagonal, w.x + w.y + w.z);
+      }
+      for (const auto& [found, bound] :
+           {std::pair{across, slabs.across}, {up, slabs.up}, {diagonal, slabs.diagonal}}) {
+        EXPECT_LT(found, bound) << e1 << ' ' << e2;
+        EXPECT_GT(found, 0.98 * double{bound}) << e1 << ' ' << e2;
+      }
+    }
+  }
+}
+
 TEST(Resident, HoldsEveryCodeStartSheetAndSample) {
   for (const std::uint32_t bits : {4U, 7U, 8U, 11U, 16U}) {
     const Asset asset = test::mixed_asset(bits);

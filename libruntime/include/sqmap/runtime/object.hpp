@@ -81,6 +81,7 @@ class PointBody;
 struct BodyPlacement;
 struct Contact;
 struct ContactQuery;
+struct WorkBudget;
 
 /// An asset made ready for queries. Immutable, so any number of threads may query one object.
 class Object {
@@ -95,7 +96,8 @@ class Object {
   /// One point, object frame [m]. A point that is not finite gets the default Answer. Bounded time, no
   /// allocation.
   Answer query(const Vec3f& p_m, const QueryOptions& options = {}) const noexcept;
-  /// Many points. Same answers as one at a time.
+  /// Many points. Same answers as one at a time. Needs up to 400 KB of stack, as do all questions about
+  /// bodies; one point needs 4 KB.
   void query(std::span<const Vec3f> points_m, const Answers& answers,
              const QueryOptions& options = {}) const noexcept;
 
@@ -110,6 +112,11 @@ class Object {
   /// @return how many there are: with Seek::kAny and kDeepest at most 1
   std::size_t contacts(const PointBody& body, const BodyPlacement& placement, std::span<Contact> contacts,
                        const ContactQuery& query) const noexcept;
+  /// The same with the deepest layer, of those up to query.options.layer, that the budget affords
+  /// (sqmap/runtime/budget.hpp); what was spent and reached is written there. Layer 1 is always afforded.
+  /// Costs the bounds and layer 1 twice.
+  std::size_t contacts(const PointBody& body, const BodyPlacement& placement, std::span<Contact> contacts,
+                       const ContactQuery& query, WorkBudget& budget) const noexcept;
 
   std::size_t part_count() const noexcept;
   std::uint32_t level_count() const noexcept;     ///< of the part that has most

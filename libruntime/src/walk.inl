@@ -1,0 +1,323 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Layer 3 of Chart (chart.hpp) for the entries of one part. Most searches end within two steps; those that do
+// not are gathered from all vectors and go on together.
+
+/// Searches under way: Chart::third_layer. The next step starts from the nearest place so far.
+struct Walk {
+  V3 p;
+  V row, col, square, d_row, d_col;
+  VI cell_row, cell_col;
+  V3 point, normal;  // normal: unnormalised
+  V on_rim;          // 1 or 0
+};
+constexpr int kWalkFields = 15;  // those of float
+HWY_INLINE void fields_of(Walk& walk, V* (&fields)[kWalkFields]) {
+  V* const all_fields[] = {&walk.p.x,     &walk.p.y,      &walk.p.z,      &walk.row,      &walk.col,
+                           &walk.square,  &walk.d_row,    &walk.d_col,    &walk.point.x,  &walk.point.y,
+                           &walk.point.z, &walk.normal.x, &walk.normal.y, &walk.normal.z, &walk.on_rim};
+  std::copy_n(all_fields, kWalkFields, fields);
+}
+
+/// Walks that are not over; entries are numbers of the part's.
+struct alignas(64) Pending {
+  float values[kWalkFields][kPadded];
+  std::int32_t cell_row[kPadded], cell_col[kPadded], entry[kPadded];
+  std::uint32_t count = 0;
+};
+
+/// Walks that ended in cells with a vertex sample.
+struct alignas(64) Fans {
+  float x[kPadded], y[kPadded], z[kPadded], row[kPadded], col[kPadded], on_rim[kPadded];
+  std::int32_t cell_row[kPadded], cell_col[kPadded], entry[kPadded];
+  std::int32_t place[kPadded], code[kPadded];  // of the sample: Resident::fan_place, fan_code
+  std::uint32_t count = 0;
+};
+
+/// Entries whose foot's cell bounds no patch.
+struct alignas(64) Lost {
+  std::int32_t entry[kPadded];
+  std::uint32_t count = 0;
+};
+
+class Walker {
+ public:
+  Walker(const Looker& looker, const Wants& wants, Entries& entries) noexcept
+      : looker_(looker), part_(looker.part()), wants_(wants), entries_(entries) {}
+
+  /// Refines those of the entries [begin, end) for whose points `asked` is not 0.
+  HWY_NOINLINE void refine(std::uint32_t begin, std::uint32_t end, const std::int32_t* asked) noexcept {
+    Lost lost;
+    for (std::uint32_t i = begin; i < end; i += lane_count()) {
+      const VI flags = hn::LoadU(kDI, entries_.flags + i);
+      const VI wished = hn::GatherIndex(kDI, asked, hn::LoadU(kDI, entries_.point + i));
+      const M wanted = hn::And(hn::FirstN(kD, end - i), as_float(hn::Gt(wished, hn::Zero(kDI))));
+      const auto has = [&](std::int32_t flag) HWY_ATTR {
+        return as_float(hn::Ne(hn::And(flags, hn::Set(kDI, flag)), hn::Zero(kDI)));
+      };
+      const M eligible = hn::And(wanted, has(kPatch));
+      const M stray = hn::AndNot(eligible, hn::And(wanted, has(kInside)));
+      const VI entry = hn::Iota(kDI, static_cast<std::int32_t>(i));
+      if (!none(stray)) {
+        hn::StoreU(hn::Compress(entry, hn::RebindMask(kDI, stray)), kDI, lost.entry + lost.count);
+        lost.count += static_cast<std::uint32_t>(hn::CountTrue(kD, stray));
+      }
+      if (none(eligible)) continue;
+      walk(load3(entries_.x, entries_.y, entries_.z, i), hn::LoadU(kD, entries_.row + i),
+           hn::LoadU(kD, entries_.col + i), entry, eligible);
+    }
+    if (lost.count > 0) seek(lost);
+    go_on();
+    if (fans_.count > 0) fans();
+  }
+
+ private:
+  static constexpr int kFirstSteps = 2;
+  static constexpr std::int32_t kNobody = kMostEntries;  // an entry that nobody reads
+
+  HWY_INLINE void solve(Walk& walk, const VPatch& patch, const V3& error, M lanes) const noexcept;
+  HWY_INLINE M advance(Walk& walk, VCell& cell, M active) const noexcept;
+  SQMAP_KERNEL Walk begin(const V3& p, V row, V col, VCell& cell) const noexcept;
+  HWY_NOINLINE void walk(const V3& p, V row, V col, VI entry, M lanes) noexcept;
+  HWY_NOINLINE void go_on() noexcept;
+  HWY_NOINLINE void seek(const Lost& lost) noexcept;
+  HWY_NOINLINE void keep(Walk& walk, VI entry, M lanes) noexcept;
+  HWY_NOINLINE void end(const Walk& walk, VI entry, M lanes) noexcept;
+  HWY_NOINLINE M set_aside(const Walk& walk, const VCell& cell, VI entry, M lanes) noexcept;
+  HWY_NOINLINE void fans() noexcept;
+  HWY_INLINE void write(VI entry, M lanes, V row, V col, V on_rim, V distance, const V3& surface,
+                        const V3& normal) noexcept;
+
+  const Looker& looker_;
+  const PartRecord& part_;
+  const Wants& wants_;
+  Entries& entries_;
+  Pending pending_;
+  Fans fans_;
+};
+
+/// Chart::step_towards, for some lanes.
+HWY_INLINE void Walker::solve(Walk& walk, const VPatch& patch, const V3& error, M lanes) const noexcept {
+  const V one = all(1.0F);
+  const V a = dot3(patch.row, patch.row), b = dot3(patch.row, patch.col), c = dot3(patch.col, patch.col);
+  const V f = dot3(patch.row, error), g = dot3(patch.col, error);
+  const V product = a * c, determinant = product - b * b;
+  const M regular = hn::Gt(determinant, all(kLeastAngle) * product);
+  const M rows_only = hn::AndNot(regular, hn::Gt(a, hn::Zero(kD)));
+  const V inverse = one / pick(regular, determinant, pick(rows_only, a, one));
+  const V d_row = pick(regular, (c * f - b * g) * inverse, hn::IfThenElseZero(rows_only, f * inverse));
+  const V d_col = hn::IfThenElseZero(regular, (a * g - b * f) * inverse);
+  const V slimness =
+      hn::Sqrt(a / most(most(c, all(kLeastAngle) * a), all(std::numeric_limits<float>::min())));
+  const V most_row = all(kMostCells * looker_.size());
+  const V most_col = least(all(looker_.turn() * 0.125F), most_row * most(slimness, one));
+  walk.d_row = pick(lanes, limited(d_row, hn::Neg(most_row), most_row), walk.d_row);
+  walk.d_col = pick(lanes, limited(d_col, hn::Neg(most_col), most_col), walk.d_col);
+}
+
+SQMAP_KERNEL Walk Walker::begin(const V3& p, V row, V col, VCell& cell) const noexcept {
+  cell = looker_.cell_at(row, col);
+  looker_.read(cell);
+  const VPatch patch = looker_.patch_at(cell, row, col);
+  const V3 error = p - patch.point;
+  Walk walk;
+  walk.p = p;
+  walk.row = row;
+  walk.col = col;
+  walk.square = dot3(error, error);
+  walk.cell_row = cell.row;
+  walk.cell_col = cell.col;
+  walk.point = patch.point;
+  walk.normal = cross3(patch.col, patch.row);
+  walk.on_rim = walk.d_row = walk.d_col = hn::Zero(kD);
+  const M everyone = hn::Eq(walk.on_rim, walk.on_rim);
+  solve(walk, patch, error, everyone);
+  return walk;
+}
+
+/// One step of the active lanes; those that are not over. `cell` is that of (row, col).
+HWY_INLINE M Walker::advance(Walk& walk, VCell& cell, M active) const noexcept {
+  const V zero = hn::Zero(kD), one = all(1.0F), least_step = all(kLeastCellStep), size = all(looker_.size());
+  active = hn::AndNot(hn::Lt(hn::Abs(walk.d_row) + hn::Abs(walk.d_col), least_step), active);
+  if (none(active)) return active;
+  const V turn = all(looker_.turn());
+  V next_row = limited(walk.row + walk.d_row, zero, all(looker_.last_row()));
+  const V moved = walk.col + walk.d_col;
+  const V raised = pick(hn::Lt(moved, zero), moved + turn, moved);
+  V next_col = pick(hn::Lt(raised, turn), raised, raised - turn);
+  VCell next = looker_.cell_at(next_row, next_col);
+  const M stays = hn::Not(looker_.read(next).eligible);
+  if (!none(hn::And(stays, active))) {
+    const V low_row = to_float(cell.row), low_col = to_float(cell.col);
+    const V rim_row = limited(walk.row + walk.d_row, low_row, low_row + size);
+    const V rim_col = limited(moved, low_col, low_col + size);
+    const M ends =
+        hn::And(stays, hn::Lt(hn::Abs(rim_row - walk.row) + hn::Abs(rim_col - walk.col), least_step));
+    active = hn::AndNot(ends, active);
+    next_row = pick(stays, rim_row, next_row);
+    next_col = pick(stays, least(rim_col, all(std::nextafter(looker_.turn(), 0.0F))), next_col);
+    next.row = pick(stays, cell.row, next.row);
+    next.col = pick(stays, cell.col, next.col);
+    for (int k = 0; k < 4; ++k) next.depth[k] = pick(stays, cell.depth[k], next.depth[k]);
+  }
+  const VPatch patch = looker_.patch_at(next, next_row, next_col);
+  const V3 error = walk.p - patch.point;
+  const V square = dot3(error, error);
+  const M better = hn::And(active, hn::Lt(square, walk.square));
+  walk.square = pick(better, square, walk.square);
+  walk.row = pick(better, next_row, walk.row);
+  walk.col = pick(better, next_col, walk.col);
+  walk.cell_row = cell.row = pick(better, next.row, cell.row);
+  walk.cell_col = cell.col = pick(better, next.col, cell.col);
+  for (int k = 0; k < 4; ++k) cell.depth[k] = pick(better, next.depth[k], cell.depth[k]);
+  walk.point = pick(better, patch.point, walk.point);
+  walk.on_rim = pick(better, hn::IfThenElseZero(stays, one), walk.on_rim);
+  if (wants_.normal) walk.normal = pick(better, cross3(patch.col, patch.row), walk.normal);
+  walk.d_row = walk.d_row * all(kBackStep);
+  walk.d_col = walk.d_col * all(kBackStep);
+  solve(walk, patch, error, better);
+  return active;
+}
+
+HWY_NOINLINE void Walker::walk(const V3& p, V row, V col, VI entry, M lanes) noexcept {
+  VCell cell;
+  Walk walk = begin(p, row, col, cell);
+  M active = lanes;
+  for (int step = 0; step < kFirstSteps; ++step) {
+    active = advance(walk, cell, active);
+    if (none(active)) break;
+  }
+  // Lanes that advance() would end at once are over, too.
+  active = hn::AndNot(hn::Lt(hn::Abs(walk.d_row) + hn::Abs(walk.d_col), all(kLeastCellStep)), active);
+  const M over = hn::AndNot(active, lanes);
+  if (!none(active)) keep(walk, entry, active);
+  if (!none(over)) end(walk, entry, over);
+}
+
+HWY_NOINLINE void Walker::keep(Walk& walk, VI entry, M lanes) noexcept {
+  V* fields[kWalkFields];
+  fields_of(walk, fields);
+  const std::uint32_t at = pending_.count;
+  for (int k = 0; k < kWalkFields; ++k)
+    hn::StoreU(hn::Compress(*fields[k], lanes), kD, pending_.values[k] + at);
+  const auto mask = hn::RebindMask(kDI, lanes);
+  hn::StoreU(hn::Compress(walk.cell_row, mask), kDI, pending_.cell_row + at);
+  hn::StoreU(hn::Compress(walk.cell_col, mask), kDI, pending_.cell_col + at);
+  hn::StoreU(hn::Compress(entry, mask), kDI, pending_.entry + at);
+  pending_.count += static_cast<std::uint32_t>(hn::CountTrue(kD, lanes));
+}
+
+HWY_NOINLINE void Walker::go_on() noexcept {
+  for (std::uint32_t i = 0; i < pending_.count; i += lane_count()) {
+    Walk walk;
+    V* fields[kWalkFields];
+    fields_of(walk, fields);
+    const M lanes = hn::FirstN(kD, pending_.count - i);
+    // Beyond the last lie leftovers, whose cells may be another part's.
+    for (int k = 0; k < kWalkFields; ++k)
+      *fields[k] = hn::IfThenElseZero(lanes, hn::LoadU(kD, pending_.values[k] + i));
+    walk.cell_row = pick(lanes, hn::LoadU(kDI, pending_.cell_row + i), hn::Zero(kDI));
+    walk.cell_col = pick(lanes, hn::LoadU(kDI, pending_.cell_col + i), hn::Zero(kDI));
+    VCell cell = looker_.cell_of(walk.cell_row, walk.cell_col);
+    looker_.read(cell);
+    M active = lanes;
+    for (int step = kFirstSteps; step < kThirdLayerSteps; ++step) {
+      active = advance(walk, cell, active);
+      if (none(active)) break;
+    }
+    end(walk, hn::LoadU(kDI, pending_.entry + i), lanes);
+  }
+  pending_.count = 0;
+}
+
+/// Chart::patch_beside, then walks from there.
+HWY_NOINLINE void Walker::seek(const Lost& lost) noexcept {
+  const float last = looker_.last_row() - looker_.size() / 2;
+  const V half = all(looker_.size() / 2), turn = all(looker_.turn()), zero = hn::Zero(kD);
+  const V infinity = all(std::numeric_limits<float>::infinity());
+  for (std::uint32_t i = 0; i < lost.count; i += lane_count()) {
+    const M lanes = hn::FirstN(kD, lost.count - i);
+    const VI entry = pick(lanes, hn::LoadU(kDI, lost.entry + i), hn::Set(kDI, kNobody));
+    const auto field = [&](const float* values)
+                           HWY_ATTR { return hn::IfThenElseZero(lanes, hn::GatherIndex(kD, values, entry)); };
+    const V3 p{field(entries_.x), field(entries_.y), field(entries_.z)};
+    V row = field(entries_.row), col = field(entries_.col);
+    const VCell foot = looker_.cell_at(row, col);
+    const V mid_row = to_float(foot.row) + half, mid_col = to_float(foot.col) + half;
+    V best = infinity;
+    M seeking = lanes;
+    for (int ring = 0; ring < kStartRings; ++ring) {
+      const V step = all(static_cast<float>(looker_.stride() << ring));
+      for (int k = 0; k < 9; ++k) {
+        if (k == 4) continue;  // the foot's own cell
+        const V here_row = mid_row + all(static_cast<float>(k / 3 - 1)) * step;
+        V here_col = mid_col + all(static_cast<float>(k % 3 - 1)) * step;
+        here_col = pick(hn::Lt(here_col, zero), here_col + turn, here_col);
+        here_col = pick(hn::Lt(here_col, turn), here_col, here_col - turn);
+        M on_map = hn::AndNot(hn::Lt(here_row, half), hn::Le(here_row, all(last)));
+        on_map = hn::And(on_map, hn::And(hn::Ge(here_col, zero), hn::Lt(here_col, turn)));
+        on_map = hn::And(on_map, seeking);
+        if (none(on_map)) continue;
+        VCell cell = looker_.cell_at(here_row, here_col);
+        const M open = hn::And(looker_.read(cell).eligible, on_map);
+        if (none(open)) continue;
+        const V3 d = p - looker_.patch_at(cell, here_row, here_col).point;
+        const V square = dot3(d, d);
+        const M better = hn::And(open, hn::Lt(square, best));
+        best = pick(better, square, best);
+        row = pick(better, here_row, row);
+        col = pick(better, here_col, col);
+      }
+      seeking = hn::AndNot(hn::Lt(best, infinity), seeking);
+      if (none(seeking)) break;
+    }
+    const M found = hn::And(lanes, hn::Lt(best, infinity));
+    if (!none(found)) walk(p, row, col, entry, found);
+  }
+}
+
+HWY_NOINLINE void Walker::end(const Walk& walk, VI entry, M lanes) noexcept {
+  VCell cell = looker_.cell_of(walk.cell_row, walk.cell_col);
+  if (looker_.stride() == 1 && part_.fans.count > 0) {
+    const M held = hn::And(lanes, looker_.block_holds(part_.fans, cell.texel[0]));
+    if (!none(held)) lanes = hn::AndNot(set_aside(walk, cell, entry, held), lanes);
+  }
+  V3 normal{hn::Zero(kD), hn::Zero(kD), hn::Zero(kD)};
+  if (wants_.normal) {
+    normal = normalized3(walk.normal);
+    const M beside_pole =
+        hn::Or(hn::Lt(walk.row, all(kBesidePole)), hn::Gt(walk.row, all(looker_.last_row() - kBesidePole)));
+    if (!none(hn::And(lanes, beside_pole))) {
+      looker_.read(cell);
+      normal = pick(beside_pole, looker_.patch_normal(cell, walk.row, walk.col), normal);
+    }
+  }
+  write(entry, lanes, walk.row, walk.col, walk.on_rim, hn::Sqrt(walk.square), walk.point, normal);
+}
+
+HWY_INLINE void Walker::write(VI entry, M lanes, V row, V col, V on_rim, V distance, const V3& surface,
+                              const V3& normal) noexcept {
+  const VI nobody = hn::Set(kDI, kNobody), at = pick(lanes, entry, nobody);
+  const VI flags = hn::GatherIndex(kDI, entries_.flags, at);
+  const M behind = as_float(hn::Ne(hn::And(flags, all_int(kBehind)), hn::Zero(kDI)));
+  VI to = at;
+  if (!none(hn::And(lanes, behind))) {
+    // A second sheet behind the first has no patch of its own: its ray distance stands where it is nearer.
+    const V second = hn::GatherIndex(kD, entries_.distance, at);
+    to = pick(hn::AndNot(hn::Lt(distance, second), behind), nobody, at);
+  }
+  const VI faces = pick(hn::Gt(on_rim, hn::Zero(kD)), hn::Zero(kDI), all_int(kFaces));
+  hn::ScatterIndex(hn::Or(hn::Or(flags, faces), all_int(kRefined | kPatch)), kDI, entries_.flags, to);
+  hn::ScatterIndex(distance, kD, entries_.distance, to);
+  hn::ScatterIndex(row, kD, entries_.row, to);
+  hn::ScatterIndex(col, kD, entries_.col, to);
+  if (wants_.surface) {
+    hn::ScatterIndex(surface.x, kD, entries_.surface[0], to);
+    hn::ScatterIndex(surface.y, kD, entries_.surface[1], to);
+    hn::ScatterIndex(surface.z, kD, entries_.surface[2], to);
+  }
+  if (!wants_.normal) return;
+  hn::ScatterIndex(normal.x, kD, entries_.normal[0], to);
+  hn::ScatterIndex(normal.y, kD, entries_.normal[1], to);
+  hn::ScatterIndex(normal.z, kD, entries_.normal[2], to);
+}
