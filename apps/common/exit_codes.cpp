@@ -9,7 +9,7 @@
 namespace sqmap::apps {
 namespace {
 
-constexpr std::array<std::pair<Exit, const char*>, 11> kMeanings{{
+constexpr std::array<std::pair<Exit, const char*>, 14> kMeanings{{
     {Exit::kOk, "done"},
     {Exit::kSomeFailed, "several inputs: at least one failed, the others are done"},
     {Exit::kUsage, "the command line is wrong; nothing was done"},
@@ -18,6 +18,9 @@ constexpr std::array<std::pair<Exit, const char*>, 11> kMeanings{{
     {Exit::kInternal, "the bake failed, or an internal error"},
     {Exit::kUnsupportedVersion, "the bundle's version is not supported"},
     {Exit::kDifferent, "diff: the bundles differ"},
+    {Exit::kLimit, "bake: one mesh, which ran into --timeout or --memory"},
+    {Exit::kCrashed, "bake: one mesh, on which the baker crashed"},
+    {Exit::kDegraded, "bake --strict: one mesh, whose bundle is less than was asked for"},
     {Exit::kInterrupted, "stopped by Ctrl-C"},
     {Exit::kPipeClosed, "stopped because the reader of the output went away"},
     {Exit::kTerminated, "stopped by SIGTERM"},

@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "files.hpp"
 
+#include <algorithm>
 #include <cerrno>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
+#include <system_error>
 #include <utility>
 
 #include <fcntl.h>
@@ -64,6 +66,16 @@ int write_all(int fd, std::span<const std::uint8_t> bytes) {
   return 0;
 }
 
+template <class Failed>
+Outcome write_through(const std::filesystem::path& path, std::span<const std::uint8_t> bytes, Failed failed) {
+  Descriptor file(::open(path.c_str(), O_WRONLY | O_CLOEXEC));
+  if (file.get() < 0) return failed(errno);
+  int code = write_all(file.get(), bytes);
+  if (const int close_code = file.close(); code == 0) code = close_code;
+  if (code != 0) return failed(code);
+  return Done{};
+}
+
 }  // namespace
 
 Result<std::vector<std::uint8_t>> read_file(const std::filesystem::path& path, std::uint64_t max_bytes) {
@@ -92,16 +104,32 @@ Outcome write_file(const std::filesystem::path& path, std::span<const std::uint8
     return Error{Status::kFileUnwritable, fmt::format("{}: {}", path.string(), std::strerror(code)),
                  "check the folder, its permissions and the free space"};
   };
-  if (std::filesystem::is_directory(path)) return failed(EISDIR);
-  std::string temporary = path.string() + ".XXXXXX";
+  std::error_code link_code;
+  std::filesystem::path target = path;
+  if (std::filesystem::is_symlink(path, link_code)) {
+    target = std::filesystem::weakly_canonical(path, link_code);
+    if (link_code) return failed(link_code.value());
+  }
+  struct stat old {};
+  const bool exists = ::stat(target.c_str(), &old) == 0;
+  if (exists && S_ISDIR(old.st_mode)) return failed(EISDIR);
+  if (exists && S_ISREG(old.st_mode) && static_cast<std::uint64_t>(old.st_size) == bytes.size()) {
+    const auto held = read_file(target, bytes.size());
+    if (held && std::ranges::equal(held.value(), bytes)) return Done{};
+  }
+  // rename() would put a file in the place of a device such as /dev/null.
+  if (exists && !S_ISREG(old.st_mode)) return write_through(target, bytes, failed);
+  std::string temporary = target.string() + ".XXXXXX";
   Descriptor file(::mkstemp(temporary.data()));
   if (file.get() < 0) return failed(errno);
   int code = write_all(file.get(), bytes);
   const mode_t mask = ::umask(0);  // mkstemp makes private files; the result gets what any new file would
   ::umask(mask);
   if (code == 0 && ::fchmod(file.get(), 0666 & ~mask) != 0) code = errno;
+  if (code == 0 && ::fsync(file.get()) != 0)
+    code = errno;  // else a power cut may leave the name without the bytes
   if (const int close_code = file.close(); code == 0) code = close_code;
-  if (code == 0 && std::rename(temporary.c_str(), path.c_str()) != 0) code = errno;
+  if (code == 0 && std::rename(temporary.c_str(), target.c_str()) != 0) code = errno;
   if (code == 0) return Done{};
   ::unlink(temporary.c_str());
   return failed(code);

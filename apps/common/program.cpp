@@ -14,6 +14,9 @@
 
 #include "sqmap/asset/version.hpp"
 
+#include "shell_docs.hpp"
+#include "spelling.hpp"
+
 namespace sqmap::apps {
 namespace {
 
@@ -25,6 +28,34 @@ std::string command_names(const Program& program) {
   for (const Command& command : program.commands)
     names += (names.empty() ? "" : ", ") + std::string(command.name);
   return names;
+}
+
+std::vector<std::string> names_of(const Program& program) {
+  std::vector<std::string> names;
+  for (const Command& command : program.commands) names.emplace_back(command.name);
+  return names;
+}
+
+/// The subcommand that was named last.
+const CLI::App& deepest(const CLI::App& app) {
+  const CLI::App* at = &app;
+  while (!at->get_subcommands().empty()) at = at->get_subcommands().back();
+  return *at;
+}
+
+/// What the first argument that looks like an option but is none was probably meant to be.
+std::string suggestion(const CLI::App& app, int argc, char** argv) {
+  std::vector<std::string> names;
+  for (const CLI::App* at = &deepest(app); at != nullptr; at = at->get_parent())
+    for (const CLI::Option* option : at->get_options())
+      for (const std::string& name : option->get_lnames()) names.push_back("--" + name);
+  for (int k = 1; k < argc; ++k) {
+    const std::string_view word(argv[k]);
+    const std::string name(word.substr(0, word.find('=')));
+    if (name == "--") break;
+    if (name.starts_with("--") && std::ranges::find(names, name) == names.end()) return did_you_mean(name, names);
+  }
+  return "";
 }
 
 /// CLI11 would call an unknown command an unexpected argument.
@@ -42,7 +73,8 @@ std::string one_line(std::string text) {
 
 Exit parse_and_run(const Program& program, Console& console, int argc, char** argv) {
   if (const char* name = unknown_command(program, argc, argv)) {
-    console.error(fmt::format("unknown command `{}`; the commands are {}", name, command_names(program)));
+    console.error(fmt::format("unknown command `{}`{}; the commands are {}", name,
+                              did_you_mean(name, names_of(program)), command_names(program)));
     return Exit::kUsage;
   }
   CLI::App app(std::string(program.summary) + "\n\nExamples:\n" + program.examples, program.name);
@@ -66,6 +98,13 @@ Exit parse_and_run(const Program& program, Console& console, int argc, char** ar
       if (option->get_positional()) option->type_name("");
   }
 
+  // Not for users: the build makes man pages and completion scripts by it.
+  if (argc == 3 && std::string_view(argv[1]) == "--generate") {
+    const Result<std::string> document = shell_document(app, argv[2]);
+    if (document) console.out(document.value());
+    if (!document) console.error(document.error().finding);
+    return document ? Exit::kOk : Exit::kUsage;
+  }
   try {
     app.parse(argc, argv);
   } catch (const CLI::CallForHelp&) {
@@ -75,9 +114,12 @@ Exit parse_and_run(const Program& program, Console& console, int argc, char** ar
     console.out(std::string(version.what()) + "\n");
     return Exit::kOk;
   } catch (const CLI::ParseError& problem) {
-    const std::vector<CLI::App*> used = app.get_subcommands();
-    console.error(fmt::format("{}; see `{}{} --help`", one_line(problem.what()), program.name,
-                              used.empty() ? "" : " " + used.front()->get_name()));
+    const bool is_extra = problem.get_exit_code() == static_cast<int>(CLI::ExitCodes::ExtrasError);
+    std::string names;
+    for (const CLI::App* at = &deepest(app); at != nullptr; at = at->get_parent())
+      names = at->get_name() + (names.empty() ? "" : " " + names);
+    console.error(fmt::format("{}{}; see `{} --help`", one_line(problem.what()),
+                              is_extra ? suggestion(app, argc, argv) : "", names));
     return Exit::kUsage;
   }
   console.set_color(color);

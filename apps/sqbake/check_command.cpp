@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include <array>
 #include <filesystem>
 #include <memory>
 #include <string>
+#include <string_view>
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
@@ -11,14 +13,15 @@
 
 #include "../common/json_text.hpp"
 #include "commands.hpp"
-#include "mesh_options.hpp"
+#include "mesh_size.hpp"
+#include "settings.hpp"
 
 namespace sqmap::apps {
 namespace {
 
 struct CheckArguments {
   std::filesystem::path input;
-  MeshOptions mesh;
+  SettingTexts settings;
   std::string format = "text";
 };
 
@@ -54,10 +57,13 @@ Exit run_check(Console& console, const CheckArguments& arguments) {
     console.error(message_for(input, error));
     return exit_for(error.status);
   };
-  const Result<bake::SourceMesh> source = bake::read_mesh(arguments.input, arguments.mesh.read);
+  const Result<AssetOptions> options = options_from(arguments.settings);
+  if (!options) return refuse(options.error());
+  const Result<bake::SourceMesh> source = bake::read_mesh(arguments.input, options.value().bake.read);
   if (!source) return refuse(source.error());
   if (const auto warning = size_warning(source.value().mesh)) console.warning(input + ": " + *warning);
-  const Result<bake::PreparedMesh> prepared = bake::check_and_repair(source.value(), arguments.mesh.repair);
+  const Result<bake::PreparedMesh> prepared =
+      bake::check_and_repair(source.value(), options.value().bake.repair);
   if (!prepared) return refuse(prepared.error());
   const MeshRecord& record = prepared.value().record;
   if (arguments.format == "text") {
@@ -87,7 +93,8 @@ std::function<Exit(Console&)> declare_check(CLI::App& app) {
       "  sqbake check hand.off\n"
       "  sqbake check scan.stl --unit mm --repair none --format json\n");
   app.add_option("INPUT", args->input, "Mesh file")->required();
-  add_mesh_options(app, args->mesh);
+  constexpr std::array<std::string_view, 3> kMeshSettings{"unit", "up", "repair"};
+  add_setting_options(app, kMeshSettings, args->settings);
   app.add_option("--format", args->format, "text or json (default text)")
       ->check(CLI::IsMember({"text", "json"}).description(""))
       ->type_name("FORMAT");

@@ -9,5 +9,10 @@ namespace sqmap::apps {
 
 std::function<Exit(Console&)> declare_bake(CLI::App& app);
 std::function<Exit(Console&)> declare_check(CLI::App& app);
+std::function<Exit(Console&)> declare_cache(CLI::App& app);
+std::function<Exit(Console&)> declare_config(CLI::App& app);
+std::function<Exit(Console&)> declare_report(CLI::App& app);
+std::function<Exit(Console&)> declare_plan(CLI::App& app);
+std::function<Exit(Console&)> declare_merge(CLI::App& app);
 
 }  // namespace sqmap::apps

@@ -3,35 +3,27 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
 #include <cerrno>
 #include <cstring>
+#include <fstream>
 #include <map>
 #include <set>
 #include <string_view>
 #include <system_error>
+#include <utility>
 
 #include <fmt/format.h>
 #include <unistd.h>
 
-#include "sqmap/io/bundle.hpp"
+#include "inputs.hpp"
 
 namespace sqmap::apps {
 namespace {
 
 namespace fs = std::filesystem;
 
-// What bake::read_mesh imports (bake/mesh.hpp).
-constexpr std::array<std::string_view, 9> kMeshExtensions{".off", ".obj", ".ply", ".stl", ".gltf",
-                                                          ".glb", ".dae", ".fbx", ".3mf"};
 constexpr std::string_view kBundleExtension = ".h5";
-
-bool has_mesh_extension(const fs::path& path) {
-  std::string extension = path.extension().string();
-  std::ranges::transform(extension, extension.begin(),
-                         [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return std::ranges::find(kMeshExtensions, extension) != kMeshExtensions.end();
-}
+constexpr std::string_view kBundleMagic{"SQMAP\x1a\n\0", 8};  // formats/FORMAT.md
 
 std::uint64_t size_or_zero(const fs::path& path) {
   std::error_code code;
@@ -46,97 +38,100 @@ fs::path output_name(const fs::path& relative, bool keep_extension) {
   return name;
 }
 
-/// Everything below a folder that is called like a mesh, sorted; pipes and dangling links too, so that each
-/// gets a record that says what is wrong with it. Names that start with a dot are hidden.
-Result<std::vector<fs::path>> meshes_in(const fs::path& folder, bool recursive) {
-  std::vector<fs::path> found;
-  std::error_code code;
-  const auto options = fs::directory_options::skip_permission_denied;
-  fs::recursive_directory_iterator entry(folder, options, code);
-  for (; !code && entry != fs::recursive_directory_iterator(); entry.increment(code)) {
-    std::error_code type_code;
-    const bool is_folder = entry->is_directory(type_code);
-    const bool is_hidden = entry->path().filename().string().starts_with('.');
-    if (is_folder && (!recursive || is_hidden)) entry.disable_recursion_pending();
-    if (!is_folder && !is_hidden && has_mesh_extension(entry->path())) found.push_back(entry->path());
-  }
-  if (code)
-    return Error{Status::kFileUnreadable, fmt::format("{}: {}", folder.string(), code.message()),
-                 "check the folder's permissions"};
-  std::ranges::sort(found);
-  return found;
+Outcome append_job(const JobRequest& request, ConfigFiles& config, Job job, const Manifest* manifest,
+                   const ManifestAsset* asset, std::vector<Job>& jobs) {
+  Result<EffectiveSettings> effective = config.settings_of(job.input, manifest, asset);
+  if (!effective) return effective.error();
+  job.settings = std::move(effective.value().values);
+  // Values that fit alone may not fit together, and those built in may not fit the mesh's own.
+  if (const Result<AssetOptions> ok = options_from(texts_of(job.settings)); !ok)
+    return Error{ok.error().status, job.input.string() + ": " + ok.error().finding, ok.error().remedy};
+  for (fs::path& file : effective.value().files) job.config_files.push_back(std::move(file));
+  if (!request.output.empty()) job.output = request.output;
+  job.input_bytes = size_or_zero(job.input);
+  jobs.push_back(std::move(job));
+  return Done{};
 }
 
-/// Jobs of one named input, appended.
-Outcome append_jobs(const fs::path& input, const JobRequest& request, std::vector<Job>& jobs) {
-  std::error_code code;
-  const fs::file_status status = fs::status(input, code);
-  if (!fs::exists(status))
-    return Error{Status::kFileMissing, fmt::format("{}: no such file or folder", input.string()),
-                 "check the path"};
-  if (!fs::is_directory(status)) {
-    const fs::path output = request.output.empty()
-                                ? request.out_dir / output_name(input.filename(), request.keep_extension)
-                                : request.output;
-    jobs.push_back({input, output, input.filename().string(), size_or_zero(input)});
-    return Done{};
-  }
-  if (!request.output.empty())
-    return Error{Status::kBadOption, fmt::format("{}: is a folder, but -o names one file", input.string()),
-                 "use --out-dir DIR"};
-  Result<std::vector<fs::path>> meshes = meshes_in(input, request.recursive);
-  if (!meshes) return meshes.error();
-  if (meshes.value().empty())
-    return Error{
-        Status::kUnknownFormat,
-        fmt::format("{}: no file with a mesh extension (off, obj, ply, stl, gltf, glb, dae, fbx, 3mf) {}",
-                    input.string(), request.recursive ? "in or below this folder" : "in this folder"),
-        request.recursive ? "" : "--recursive looks below it"};
-  for (const fs::path& mesh : meshes.value()) {
-    const fs::path relative = mesh.lexically_relative(input);
-    jobs.push_back({mesh, request.out_dir / output_name(relative, request.keep_extension), relative.string(),
-                    size_or_zero(mesh)});
+Outcome append_manifest(const JobRequest& request, ConfigFiles& config, std::vector<Job>& jobs) {
+  const Result<Manifest> manifest = read_manifest(request.manifest);
+  if (!manifest) return manifest.error();
+  for (const ManifestAsset& asset : manifest.value().assets) {
+    const fs::path input = (request.manifest.parent_path() / asset.input).lexically_normal();
+    if (::access(input.c_str(), R_OK) != 0)
+      return Error{errno == ENOENT || errno == ENOTDIR ? Status::kFileMissing : Status::kFileUnreadable,
+                   fmt::format("{}: {}: {}", request.manifest.string(), input.string(), std::strerror(errno)),
+                   "check the path; it is relative to the manifest"};
+    const fs::path relative = asset.input.lexically_normal();
+    const bool is_below = relative.is_relative() && *relative.begin() != "..";
+    const fs::path place = is_below ? relative : relative.filename();
+    Job job;
+    job.input = input;
+    job.output =
+        request.out_dir / (asset.output.empty() ? output_name(place, request.keep_extension) : asset.output);
+    job.name = place.string();
+    if (const Outcome ok = append_job(request, config, std::move(job), &manifest.value(), &asset, jobs); !ok)
+      return ok.error();
   }
   return Done{};
 }
 
 Outcome check_clashes(const std::vector<Job>& jobs) {
   std::map<fs::path, const Job*> owner;
+  std::map<fs::path, fs::path> folders;  // weakly_canonical asks the system for every name on the way
   for (const Job& job : jobs) {
-    const auto [entry, is_new] = owner.emplace(fs::weakly_canonical(job.output), &job);
+    const auto [folder, is_new_folder] = folders.emplace(job.output.parent_path(), fs::path());
+    std::error_code code;
+    if (is_new_folder)
+      folder->second = fs::weakly_canonical(fs::absolute(job.output, code).parent_path(), code);
+    const auto [entry, is_new] = owner.emplace(folder->second / job.output.filename(), &job);
     if (!is_new)
       return Error{Status::kBadOption,
                    fmt::format("{} and {} would both be written to {}", entry->second->input.string(),
                                job.input.string(), job.output.string()),
-                   "bake them into different folders, or add --keep-extension"};
+                   "bake them into different folders, name their folder in place of the files, or add "
+                   "--keep-extension"};
   }
   return Done{};
 }
 
-/// An existing output is replaced only when it is a bundle (of any version) or empty.
+/// An existing output is replaced only when it is a bundle (of any version, also a damaged one) or empty.
 Outcome check_overwrite(const fs::path& output) {
   std::error_code code;
   const fs::file_status status = fs::status(output, code);
   if (!fs::exists(status)) return Done{};
   if (fs::is_regular_file(status)) {
-    if (size_or_zero(output) == 0) return Done{};
-    const Result<Asset> old = io::read(output);
-    if (old || old.error().status == Status::kUnsupportedVersion) return Done{};
+    std::array<char, kBundleMagic.size()> start{};
+    std::ifstream file(output, std::ios::binary);
+    file.read(start.data(), static_cast<std::streamsize>(start.size()));
+    if (size_or_zero(output) == 0 || std::string_view(start.data(), start.size()) == kBundleMagic)
+      return Done{};
   }
   return Error{
-      Status::kFileUnwritable, fmt::format("{}: exists and is not an intact sqmap bundle", output.string()),
+      Status::kFileUnwritable, fmt::format("{}: exists and is not an sqmap bundle", output.string()),
       fs::is_regular_file(status) ? "name another file, or overwrite it with --force" : "name another file"};
 }
 
 Outcome check_request(const JobRequest& request) {
+  const std::size_t count = request.inputs.size() + (request.manifest.empty() ? 0 : 1);
+  if (count == 0)
+    return Error{Status::kBadOption, "INPUT is required",
+                 "name mesh files, folders of them, or --manifest FILE"};
   if (request.output.empty() && request.out_dir.empty())
     return Error{Status::kBadOption, "no output named",
                  "add -o FILE.h5, or --out-dir DIR for several inputs"};
   if (!request.output.empty() && !request.out_dir.empty())
     return Error{Status::kBadOption, "-o and --out-dir exclude each other", "use one of them"};
-  if (!request.output.empty() && request.inputs.size() > 1)
-    return Error{Status::kBadOption, fmt::format("-o names one file for {} inputs", request.inputs.size()),
+  if (!request.output.empty() && count > 1)
+    return Error{Status::kBadOption, fmt::format("-o names one file for {} inputs", count),
                  "use --out-dir DIR"};
+  std::error_code code;
+  if (!request.output.empty() && !request.inputs.empty() && fs::is_directory(request.inputs.front(), code))
+    return Error{Status::kBadOption,
+                 fmt::format("{}: is a folder, but -o names one file", request.inputs.front()),
+                 "use --out-dir DIR"};
+  if (!request.output.empty() && !request.manifest.empty())
+    return Error{Status::kBadOption, "-o names one file, a manifest many", "use --out-dir DIR"};
   if (!request.output.empty() && request.output.extension() != kBundleExtension)
     return Error{Status::kBadOption, fmt::format("{}: a bundle's name ends in .h5", request.output.string()),
                  "choose a name that ends in .h5"};
@@ -148,11 +143,27 @@ Outcome check_request(const JobRequest& request) {
 Result<JobList> list_jobs(const JobRequest& request) {
   if (const Outcome ok = check_request(request); !ok) return ok.error();
   JobList list;
-  for (const fs::path& input : request.inputs)
-    if (const Outcome ok = append_jobs(input, request, list.jobs); !ok) return ok.error();
-  std::error_code code;
-  list.single_file = request.inputs.size() == 1 && !fs::is_directory(request.inputs.front(), code);
+  ConfigFiles config(request.config);
+  const Result<InputList> inputs = list_inputs(request.inputs, request.recursive);
+  if (!inputs) return inputs.error();
+  if (!request.output.empty() && !inputs.value().is_single_file)
+    return Error{Status::kBadOption,
+                 fmt::format("{}: names several meshes, but -o one file", request.inputs.front()),
+                 "use --out-dir DIR"};
+  for (const InputMesh& mesh : inputs.value().meshes) {
+    Job job;
+    job.input = mesh.path;
+    job.output = request.out_dir / output_name(mesh.place, request.keep_extension);
+    job.name = mesh.place.string();
+    job.config_files = inputs.value().lists;
+    if (const Outcome ok = append_job(request, config, std::move(job), nullptr, nullptr, list.jobs); !ok)
+      return ok.error();
+  }
+  if (!request.manifest.empty())
+    if (const Outcome ok = append_manifest(request, config, list.jobs); !ok) return ok.error();
+  list.single_file = inputs.value().is_single_file && request.manifest.empty();
   if (const Outcome ok = check_clashes(list.jobs); !ok) return ok.error();
+  std::error_code code;
   for (const Job& job : list.jobs)
     if (const Outcome ok = check_overwrite(job.output);
         !ok && (!request.force || fs::is_directory(job.output, code)))

@@ -8,23 +8,31 @@
 
 #include "sqmap/asset/result.hpp"
 
+#include "config_files.hpp"
+#include "settings.hpp"
+
 namespace sqmap::apps {
 
 /// What to bake where, as the command line says it.
 struct JobRequest {
-  std::vector<std::filesystem::path> inputs;  ///< files and folders
-  std::filesystem::path output;               ///< -o; empty when out_dir is used
-  std::filesystem::path out_dir;              ///< --out-dir; empty when output is used
-  bool recursive = false;                     ///< look below folders
-  bool keep_extension = false;                ///< NAME.off.h5 in place of NAME.h5
-  bool force = false;                         ///< overwrite files that are not bundles
+  std::vector<std::string> inputs;  ///< files, folders, patterns and lists: see inputs.hpp
+  std::filesystem::path manifest;   ///< names further inputs; may be empty
+  std::filesystem::path output;     ///< -o; empty when out_dir is used
+  std::filesystem::path out_dir;    ///< --out-dir; empty when output is used
+  bool recursive = false;           ///< look below folders
+  bool keep_extension = false;      ///< NAME.off.h5 in place of NAME.h5
+  bool force = false;               ///< overwrite files that are not bundles
+  ConfigRequest config;
 };
 
 struct Job {
   std::filesystem::path input;
   std::filesystem::path output;
-  std::string name;           ///< for tables: the file, with its folders below the one that was named
-  std::uint64_t input_bytes;  ///< 0 when unknown
+  std::string name;             ///< for tables: the file, with its folders below the one that was named
+  std::uint64_t input_bytes{};  ///< 0 when unknown
+  SettingValues settings;       ///< all of them
+  /// Files other than the mesh that decided what is baked: lists, manifest, project file, sidecar.
+  std::vector<std::filesystem::path> config_files;
 };
 
 struct JobList {
@@ -32,9 +40,10 @@ struct JobList {
   bool single_file = false;  ///< one file was named: its error is the program's error
 };
 
-/// The jobs of a request. Looks at names and folders only: no mesh is read, nothing is written.
-/// Errors: kBadOption (options that do not fit, two inputs for one output), kFileMissing, kUnknownFormat (a
-/// folder without meshes), kFileUnwritable (an output that is not a bundle of ours, without force).
+/// The jobs of a request. Reads lists and TOML files, but no mesh, and writes nothing.
+/// Errors: kBadOption (options that do not fit, two inputs for one output, a wrong setting), kFileMissing,
+/// kFileUnreadable, kUnknownFormat (a folder without meshes), kFileUnwritable (an output that is no bundle of
+/// ours, without force).
 Result<JobList> list_jobs(const JobRequest& request);
 
 /// Makes the output folders and checks that they can be written. Errors: kFileUnwritable.

@@ -56,20 +56,29 @@ void ProgressBoard::finished(std::size_t index) {
 void ProgressBoard::draw(std::size_t index) {
   last_draw_ = Clock::now();
   std::string line;
-  if (items_.size() > 1) line += fmt::format("[{}/{}] ", finished_count_, items_.size());
+  if (items_.size() > 1) line += fmt::format("[{}/{}] ", finished_count_ + skipped_count_, items_.size());
   line +=
       fmt::format("{}  {} {:.0f} %", items_[index].name, states_[index].stage, 100 * states_[index].fraction);
   const auto running = std::ranges::count_if(states_, &State::is_running);
   if (running > 1) line += fmt::format(" and {} more", running - 1);
-  console_.status(line + time_left());
+  console_.status(line + rate_and_time_left());
 }
 
-std::string ProgressBoard::time_left() const {
+void ProgressBoard::skip(std::size_t index) {
+  const std::scoped_lock lock(mutex_);
+  ++skipped_count_;
+  total_weight_ -= items_[index].weight;
+}
+
+std::string ProgressBoard::rate_and_time_left() const {
   if (finished_count_ == 0 || finished_weight_ == 0 || items_.size() < 2) return "";
   const double elapsed_s = std::chrono::duration<double>(Clock::now() - start_).count();
+  const double rate_per_s = static_cast<double>(finished_count_) / elapsed_s;
   const auto left_s = static_cast<long>(elapsed_s * static_cast<double>(total_weight_ - finished_weight_) /
                                         static_cast<double>(finished_weight_));
-  return fmt::format("  {}:{:02} left", left_s / 60, left_s % 60);
+  const std::string rate =
+      rate_per_s >= 1 ? fmt::format("{:.1f}/s", rate_per_s) : fmt::format("{:.1f}/min", 60 * rate_per_s);
+  return fmt::format("  {}  {}:{:02}:{:02} left", rate, left_s / 3600, left_s / 60 % 60, left_s % 60);
 }
 
 }  // namespace sqmap::apps

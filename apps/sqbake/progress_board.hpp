@@ -12,8 +12,8 @@
 
 namespace sqmap::apps {
 
-/// Shows how far a run has come: on a terminal one line that is rewritten (count, asset, stage, percent, time
-/// left), else, when asked for, one line a stage. Thread-safe.
+/// Shows how far a run has come: on a terminal one line that is rewritten (count, asset, stage, percent,
+/// rate, time left), else, when asked for, one line a stage. Thread-safe.
 class ProgressBoard {
  public:
   struct Item {
@@ -24,13 +24,15 @@ class ProgressBoard {
 
   void at(std::size_t index, std::string_view stage, double fraction);
   void finished(std::size_t index);
+  /// It needs no work; it does not count for the rate.
+  void skip(std::size_t index);
 
  private:
   using Clock = std::chrono::steady_clock;
   enum class Style { kNone, kLine, kPlain };
 
   void draw(std::size_t index);
-  std::string time_left() const;
+  std::string rate_and_time_left() const;
 
   struct State {
     std::string stage;
@@ -41,7 +43,7 @@ class ProgressBoard {
   Style style_;
   std::vector<Item> items_;
   std::vector<State> states_;
-  std::size_t finished_count_ = 0;
+  std::size_t finished_count_ = 0, skipped_count_ = 0;
   std::uint64_t finished_weight_ = 0, total_weight_ = 0;
   Clock::time_point start_, last_draw_;
   std::mutex mutex_;

@@ -63,13 +63,26 @@ Result<std::uint64_t> parse_bytes(std::string_view text) {
   std::uint64_t number = 0;
   const auto [end, code] = std::from_chars(text.data(), text.data() + text.size(), number);
   const std::string_view suffix = text.substr(static_cast<std::size_t>(end - text.data()));
-  constexpr std::array<std::pair<std::string_view, int>, 5> kSuffixes{
-      {{"", 0}, {"K", 10}, {"KiB", 10}, {"M", 20}, {"MiB", 20}}};
+  constexpr std::array<std::pair<std::string_view, int>, 7> kSuffixes{
+      {{"", 0}, {"K", 10}, {"KiB", 10}, {"M", 20}, {"MiB", 20}, {"G", 30}, {"GiB", 30}}};
   if (code == std::errc{} && number > 0)
     for (const auto& [name, shift] : kSuffixes)
       if (suffix == name && number <= (std::numeric_limits<std::uint64_t>::max() >> shift))
         return number << shift;
-  return bad(text, "a number of bytes > 0, with K or M for 1024 and 1024 * 1024");
+  return bad(text, "a number of bytes > 0, with K, M or G for powers of 1024");
+}
+
+Result<double> parse_duration(std::string_view text) {
+  if (text == "none") return 0.0;
+  constexpr std::array<std::pair<std::string_view, double>, 4> kSuffixes{
+      {{"", 1}, {"s", 1}, {"m", 60}, {"h", 3600}}};
+  constexpr double kLongest_s = 1e7;  // fits every clock's integers
+  double number = 0;
+  std::string_view rest;
+  if (split_number(text, number, rest))
+    for (const auto& [name, seconds] : kSuffixes)
+      if (rest == name && number * seconds <= kLongest_s) return number * seconds;
+  return bad(text, "a time > 0 such as 90s, 5m or 2h, or none");
 }
 
 }  // namespace sqmap::apps

@@ -19,7 +19,10 @@ struct ErrorTarget {
 /// "0.1%" or "0.1" (percent of R_max), or "0.5mm" (a length with a unit). Must be > 0.
 Result<ErrorTarget> parse_error_target(std::string_view text);
 
-/// "131072", "128K" or "4M" (1024 bytes, 1024 * 1024 bytes). Must be > 0.
+/// "131072", "128K", "4M" or "2G" (powers of 1024). Must be > 0.
 Result<std::uint64_t> parse_bytes(std::string_view text);
+
+/// Seconds: "90", "90s", "5m", "2h"; 0 for "none". Otherwise > 0.
+Result<double> parse_duration(std::string_view text);
 
 }  // namespace sqmap::apps

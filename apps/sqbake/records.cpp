@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <set>
+#include <utility>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
@@ -10,55 +11,42 @@
 #include "sqmap/asset/version.hpp"
 
 #include "../common/json_text.hpp"
+#include "record_json.hpp"
 
 namespace sqmap::apps {
 namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr const char* kSchema = "sqmap.bake/1";
-
-Json record_json(const BakeRecord& record) {
-  Json json{{"schema", kSchema},
-            {"type", "asset"},
-            {"input", record.input},
-            {"output", record.output},
-            {"outcome", !record.error                                ? "ok"
-                        : record.error->status == Status::kCancelled ? "cancelled"
-                                                                     : "failed"},
-            {"seconds", record.seconds}};
-  if (record.error) {
-    json["error"] = {{"status", static_cast<int>(record.error->status)},
-                     {"id", status_name(record.error->status)},
-                     {"exit_code", static_cast<int>(exit_for(record.error->status))},
-                     {"finding", record.error->finding},
-                     {"remedy", record.error->remedy}};
-    return json;
-  }
-  json["parts"] = record.parts;
-  json["segments"] = record.segments;
-  json["bytes"] = record.bytes;
-  json["r_max_m"] = record.r_max_m;
-  json["stopped_by"] = record.stopped_by;
-  if (const ErrorRow* row = record.finest()) {
-    json["eq35_percent"] = row->eq35_percent;
-    json["depth_mean_percent"] = row->depth_mean_percent;
-    json["misclassified_3_percent"] = row->misclassified_3_percent;
-    json["misclassified_05_percent"] = row->misclassified_05_percent;
-  }
-  json["mesh"] = to_json(record.mesh);
-  json["errors"] = to_json(record.errors);
-  json["stages"] = Json::array();
-  for (const bake::StageTime& time : record.times)
-    json["stages"].push_back({{"stage", time.stage}, {"seconds", time.seconds}});
-  return json;
-}
+constexpr std::array<const char*, kVerdictCount> kVerdictNames{"ok",     "degraded", "failed",   "timeout",
+                                                               "memory", "crashed",  "cancelled"};
 
 std::string percent(double value) {
   return value == value ? fmt::format("{:.3f}", value) : "-";  // NaN: not measured
 }
 
 }  // namespace
+
+const char* verdict_name(Verdict verdict) noexcept {
+  return kVerdictNames[static_cast<std::size_t>(verdict)];
+}
+
+Exit exit_of(const BakeRecord& record) noexcept {
+  switch (record.verdict) {
+    case Verdict::kOk:
+    case Verdict::kDegraded:
+      return Exit::kOk;
+    case Verdict::kTimeout:
+    case Verdict::kMemory:
+      return Exit::kLimit;
+    case Verdict::kCrashed:
+      return Exit::kCrashed;
+    case Verdict::kFailed:
+    case Verdict::kCancelled:
+      break;
+  }
+  return record.error ? exit_for(record.error->status) : Exit::kInternal;
+}
 
 void BakeRecord::describe(const Asset& asset) {
   parts = static_cast<std::uint32_t>(asset.parts.size());
@@ -79,8 +67,6 @@ const ErrorRow* BakeRecord::finest() const {
 
 struct RecordWriter::Tail {
   Json assets = Json::array();
-  std::size_t ok = 0, failed = 0, cancelled = 0;
-  bool has_header = false;
 };
 
 RecordWriter::RecordWriter(Console& console, const Options& options)
@@ -90,37 +76,33 @@ RecordWriter::RecordWriter(Console& console, const Options& options)
 RecordWriter::~RecordWriter() = default;
 
 void RecordWriter::add(const BakeRecord& record) {
-  if (!record.error) {
-    ++tail_->ok;
-  } else if (record.error->status == Status::kCancelled) {
-    ++tail_->cancelled;
-  } else {
-    ++tail_->failed;
-  }
+  ++counts_[static_cast<std::size_t>(record.verdict)];
+  if (record.is_cached) ++cached_;
   switch (options_.format) {
     case RecordFormat::kText:
       if (!options_.quiet) add_text(record);
       break;
     case RecordFormat::kJson:
-      tail_->assets.push_back(record_json(record));
+      tail_->assets.push_back(Json::parse(record_line(record)));
       break;
     case RecordFormat::kNdjson:
-      console_.out(json_line(record_json(record)));
+      console_.out(record_line(record));
       break;
   }
 }
 
 void RecordWriter::add_text(const BakeRecord& record) {
-  if (record.error && (options_.is_single || record.error->status == Status::kCancelled)) return;
+  if (!record.has_bundle() && (options_.is_single || record.verdict == Verdict::kCancelled)) return;
   std::string text;
-  if (!tail_->has_header) {
-    tail_->has_header = true;
+  if (!has_header_) {
+    has_header_ = true;
     text += fmt::format("{:<{}} {:>5} {:>8} {:>9} {:>9} {:>9} {:<10} {:>8}\n", "asset", options_.name_width,
                         "parts", "segments", "bytes", "eq35 %", "wrong %", "stopped by", "seconds");
   }
-  if (record.error) {
+  if (!record.has_bundle()) {
     text += fmt::format("{:<{}} {:>5} {:>8} {:>9} {:>9} {:>9} {:<10} {:>8.2f}\n", record.name,
-                        options_.name_width, "-", "-", "-", "-", "-", "failed", record.seconds);
+                        options_.name_width, "-", "-", "-", "-", "-", verdict_name(record.verdict),
+                        record.seconds);
   } else {
     const ErrorRow* row = record.finest();
     text += fmt::format("{:<{}} {:>5} {:>8} {:>9} {:>9} {:>9} {:<10} {:>8.2f}\n", record.name,
@@ -136,14 +118,11 @@ void RecordWriter::add_text(const BakeRecord& record) {
 
 void RecordWriter::finish(double seconds) {
   if (options_.format == RecordFormat::kText) return;
-  Json summary{{"schema", kSchema},
-               {"type", "summary"},
-               {"generator", "sqbake"},
-               {"generator_version", kVersion},
-               {"ok", tail_->ok},
-               {"failed", tail_->failed},
-               {"cancelled", tail_->cancelled},
-               {"seconds", seconds}};
+  Json summary{
+      {"schema", kBakeSchema}, {"type", "summary"}, {"generator", "sqbake"}, {"generator_version", kVersion}};
+  for (std::size_t k = 0; k < kVerdictCount; ++k) summary[kVerdictNames[k]] = counts_[k];
+  summary["cached"] = cached_;
+  summary["seconds"] = seconds;
   if (options_.format == RecordFormat::kNdjson) {
     console_.out(json_line(summary));
     return;

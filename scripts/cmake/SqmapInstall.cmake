@@ -2,6 +2,7 @@
 # What `cmake --install` puts where. Libraries come in two components, so that a user of the runtime never needs HDF5:
 #   runtime   sqmap::asset, sqmap::runtime    no dependency
 #   io        sqmap::io, sqmap::c             needs HDF5 and zlib
+#   bake      sqmap::sqbake, sqmap_bake()     the program, for builds that bake meshes
 # libbake is not installed: it is GPL and only the programs need it.
 option(SQMAP_INSTALL "Install sqmap with the project that contains it" ${PROJECT_IS_TOP_LEVEL})
 if(NOT SQMAP_INSTALL)
@@ -31,7 +32,27 @@ if(TARGET sqmap_io)
   install(DIRECTORY ${PROJECT_SOURCE_DIR}/formats/include/sqmap/io DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/sqmap)
 endif()
 if(SQMAP_BUILD_BAKE)
-  install(TARGETS sqbake sqinfo sqsim sqbench RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
+  install(TARGETS sqbake sqinfo sqsim sqbench EXPORT sqmap-bake RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
+  install(EXPORT sqmap-bake FILE sqmap-bake-targets.cmake NAMESPACE sqmap:: DESTINATION ${SQMAP_PACKAGE_DIR})
+  install(FILES ${CMAKE_CURRENT_LIST_DIR}/SqmapBake.cmake DESTINATION ${SQMAP_PACKAGE_DIR})
+  # Each program writes its own man page and completion scripts.
+  set(SQMAP_SHELL_DOCS ${PROJECT_BINARY_DIR}/shell_docs)
+  file(MAKE_DIRECTORY ${SQMAP_SHELL_DOCS})
+  foreach(program sqbake sqinfo sqbench)
+    set(names man ${program}.1 bash ${program} zsh _${program} fish ${program}.fish)
+    while(names)
+      list(POP_FRONT names kind name)
+      set(document ${SQMAP_SHELL_DOCS}/${name})
+      add_custom_command(OUTPUT ${document} COMMAND ${program} --generate ${kind} > ${document} DEPENDS ${program}
+                         VERBATIM)
+      list(APPEND documents ${document})
+    endwhile()
+    install(FILES ${SQMAP_SHELL_DOCS}/${program}.1 DESTINATION ${CMAKE_INSTALL_MANDIR}/man1)
+    install(FILES ${SQMAP_SHELL_DOCS}/${program} DESTINATION ${CMAKE_INSTALL_DATADIR}/bash-completion/completions)
+    install(FILES ${SQMAP_SHELL_DOCS}/_${program} DESTINATION ${CMAKE_INSTALL_DATADIR}/zsh/site-functions)
+    install(FILES ${SQMAP_SHELL_DOCS}/${program}.fish DESTINATION ${CMAKE_INSTALL_DATADIR}/fish/vendor_completions.d)
+  endforeach()
+  add_custom_target(sqmap_shell_docs ALL DEPENDS ${documents})
 endif()
 
 configure_package_config_file(${CMAKE_CURRENT_LIST_DIR}/sqmapConfig.cmake.in sqmapConfig.cmake

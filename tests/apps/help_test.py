@@ -21,7 +21,7 @@ class Help(unittest.TestCase):
 
     def test_prints_the_table_of_exit_codes(self):
         table = re.findall(r"^ +(\d+)  \S", run("sqbake", "--help").stdout.split("Exit codes:")[1], re.MULTILINE)
-        self.assertEqual([int(code) for code in table], [0, 1, 2, 3, 4, 5, 6, 7, 130, 141, 143])
+        self.assertEqual([int(code) for code in table], [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 130, 141, 143])
 
     def test_top_help_names_every_command(self):
         for program, names in COMMANDS.items():
@@ -48,6 +48,8 @@ class Usage(unittest.TestCase):
         (("sqbake", "bake", "x.off", "-o", "x.h5", "--max-bytes", "12X"), "`12X`"),
         (("sqbake", "bake", "x.off", "-o", "x.h5", "--max-parts", "0"), "max_parts"),
         (("sqbake", "bake", "x.off", "-o", "x.h5", "--repair", "some"), "--repair"),
+        (("sqbake", "bake", "x.off", "-o", "x.h5", "--timeout", "soon"), "`soon`"),
+        (("sqbake", "bake", "x.off", "-o", "x.h5", "--memory", "4M"), "16M"),
         (("sqbake", "bake", "x.off", "-o", "x.h5", "-q", "-v"), "--quiet"),
         (("sqbake", "check"), "INPUT"),
         (("sqinfo", "show"), "BUNDLE"),

@@ -6,20 +6,7 @@
 
 #include "sqmap/bake/mesh.hpp"
 
-namespace CLI {
-class App;
-}
-
 namespace sqmap::apps {
-
-/// Options that say how to read and repair a mesh, shared by the subcommands.
-struct MeshOptions {
-  bake::ReadOptions read;
-  bake::RepairOptions repair;
-};
-
-/// Adds --unit, --up and --repair. `options` must outlive the parsing.
-void add_mesh_options(CLI::App& app, MeshOptions& options);
 
 /// Diagonal of the bounding box [m]; 0 for a mesh without vertices.
 double diagonal_m(const bake::Mesh& mesh);

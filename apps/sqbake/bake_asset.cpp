@@ -1,0 +1,168 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "bake_asset.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <exception>
+#include <new>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "sqmap/bake/bake.hpp"
+#include "sqmap/io/bundle.hpp"
+
+#include "mesh_size.hpp"
+#include "worker_pool.hpp"
+
+namespace sqmap::apps {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+double seconds_since(Clock::time_point start) {
+  return std::chrono::duration<double>(Clock::now() - start).count();
+}
+
+/// The bake's options for one mesh: a target given as a length becomes a share of R_max.
+bake::BakeOptions options_for(const AssetOptions& asked, const bake::SourceMesh& source) {
+  bake::BakeOptions options = asked.bake;
+  // R_max is known only after repair; the diagonal is never shorter, so the target is never looser than
+  // asked.
+  if (asked.max_error && asked.max_error->length_m > 0)
+    options.max_error_percent = std::min(100.0, 100 * asked.max_error->length_m / diagonal_m(source.mesh));
+  return options;
+}
+
+// Error target of the fallback, in percent of R_max: coarse, so that it costs little.
+constexpr double kFallbackError_percent = 2;
+
+/// As plain as libbake gets: components are not cut, the maps are coarse.
+bake::BakeOptions fallback_options(bake::BakeOptions options) {
+  options.max_error_percent = std::max(options.max_error_percent, kFallbackError_percent);
+  options.max_parts = 1;
+  options.decompose.source_count = 1;
+  options.decompose.use_boundary_strength = false;
+  options.decompose.use_hyperbolic = false;
+  options.fit.quick = true;
+  options.sample_count = std::min(options.sample_count, std::uint32_t{2000});
+  return options;
+}
+
+/// Marks the bundle: who finds it later must be able to tell.
+void mark_fallback(Provenance& provenance) {
+  auto options = nlohmann::json::parse(provenance.options_json);
+  options["fallback"] = "superquadric";
+  provenance.options_json = options.dump();
+}
+
+/// Bytes of a file name that are not UTF-8 become U+FFFD: a bundle holds no other text.
+std::string as_utf8(const std::string& name) {
+  using Json = nlohmann::json;
+  return Json::parse(Json(name).dump(-1, ' ', false, Json::error_handler_t::replace)).get<std::string>();
+}
+
+/// Where two bakes of one input differ; empty: nowhere.
+std::string difference(const std::vector<std::uint8_t>& a, const std::vector<std::uint8_t>& b) {
+  if (a == b) return "";
+  if (a.size() != b.size()) return fmt::format("one has {} bytes, the other {}", a.size(), b.size());
+  const auto at = std::ranges::mismatch(a, b).in1 - a.begin();
+  return fmt::format("of {} bytes, that at {} is the first that differs", a.size(), at);
+}
+
+std::optional<Error> bake_into(BakeProduct& product, const BakeJob& job, const AssetOptions& asked,
+                               const bake::Progress& progress) {
+  BakeRecord& record = product.record;
+  progress.at("read", 0);
+  const Clock::time_point read_start = Clock::now();
+  Result<bake::SourceMesh> source = bake::read_mesh(job.input, asked.bake.read);
+  if (!source) return source.error();
+  source.value().name = as_utf8(source.value().name);
+  record.times.push_back({"read", seconds_since(read_start)});
+  if (const auto warning = size_warning(source.value().mesh)) record.warnings.push_back(*warning);
+
+  bake::BakeOptions options = options_for(asked, source.value());
+  if (job.is_fallback) options = fallback_options(options);
+  Result<bake::BakeResult> result = bake::bake(source.value(), options, progress);
+  if (!result) return result.error();
+  Asset& asset = result.value().asset;
+  if (job.is_fallback) mark_fallback(asset.provenance);
+  for (bake::StageTime& time : result.value().times) record.times.push_back(std::move(time));
+  record.describe(asset);
+  record.stopped_by = result.value().stopped_by;
+  if (!asset.mesh.is_closed)
+    record.degradations.push_back(
+        {"open-mesh",
+         fmt::format("{} edges with one face and {} with more than two remain; inside is where the "
+                     "winding number exceeds 1/2",
+                     asset.mesh.boundary_edges, asset.mesh.non_manifold_edges)});
+
+  progress.at("encode", 0);
+  const Clock::time_point encode_start = Clock::now();
+  Result<std::vector<std::uint8_t>> bytes = io::encode(asset);
+  if (!bytes) return bytes.error();
+  record.times.push_back({"encode", seconds_since(encode_start)});
+  product.bundle = std::move(bytes).value();
+  record.bytes = product.bundle.size();
+  return std::nullopt;
+}
+
+BakeProduct bake_once(const BakeJob& job, unsigned threads, const bake::Progress& progress) {
+  BakeProduct product;
+  BakeRecord& record = product.record;
+  run_jobs(1, threads, [&](std::size_t) {
+    try {
+      const Result<AssetOptions> options = options_from(job.settings);
+      record.error = options ? bake_into(product, job, options.value(), progress) : options.error();
+      if (record.error)
+        record.verdict = record.error->status == Status::kCancelled ? Verdict::kCancelled : Verdict::kFailed;
+    } catch (const std::bad_alloc&) {
+      record.verdict = Verdict::kMemory;
+      record.error =
+          Error{Status::kBakeFailed, "out of memory", "bake fewer meshes at once (-j), or a smaller mesh"};
+    } catch (const std::exception& problem) {
+      record.verdict = Verdict::kFailed;
+      record.error = Error{Status::kBakeFailed, std::string("internal error: ") + problem.what(), ""};
+    }
+  });
+  if (record.error) product.bundle.clear();
+  return product;
+}
+
+/// Bakes the mesh once more with another number of threads and fails the record where the bytes differ.
+void verify(BakeProduct& product, const BakeJob& job, const bake::Progress& progress) {
+  const unsigned other_threads = job.threads == 1 ? 2 : 1;
+  const Clock::time_point start = Clock::now();
+  const BakeProduct again = bake_once(job, other_threads, progress);
+  BakeRecord& record = product.record;
+  record.times.push_back({"verify", seconds_since(start)});
+  if (again.record.error) {
+    record.verdict = again.record.verdict;
+    record.error = again.record.error;
+  } else if (const std::string where = difference(product.bundle, again.bundle); !where.empty()) {
+    record.verdict = Verdict::kFailed;
+    record.error =
+        Error{Status::kBakeFailed,
+              fmt::format("two bakes, with {} and {} threads, differ: {}", job.threads, other_threads, where),
+              "report this with the mesh"};
+  }
+  if (record.error) product.bundle.clear();
+}
+
+}  // namespace
+
+BakeProduct bake_asset(const BakeJob& job, const bake::Progress& progress) {
+  const Clock::time_point start = Clock::now();
+  BakeProduct product = bake_once(job, job.threads, progress);
+  if (job.verify_determinism && !product.record.error) verify(product, job, progress);
+  BakeRecord& record = product.record;
+  record.input = job.input.string();
+  if (!record.error && !record.degradations.empty()) record.verdict = Verdict::kDegraded;
+  record.seconds = seconds_since(start);
+  return product;
+}
+
+}  // namespace sqmap::apps

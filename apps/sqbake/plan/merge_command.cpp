@@ -1,0 +1,124 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "../../common/files.hpp"
+#include "../../common/json_text.hpp"
+#include "../commands.hpp"
+#include "../report/report_page.hpp"
+#include "merge.hpp"
+
+namespace sqmap::apps {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr std::uint64_t kLargestRecords = std::uint64_t{1} << 30;
+
+struct MergeArguments {
+  std::vector<std::filesystem::path> records;
+  std::filesystem::path plan, output, report;
+};
+
+std::string_view text_of(const std::vector<std::uint8_t>& bytes) {
+  return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
+}
+
+Result<std::vector<AssetRecord>> read_records(Console& console,
+                                              const std::vector<std::filesystem::path>& files) {
+  std::vector<AssetRecord> all;
+  for (const std::filesystem::path& file : files) {
+    const Result<std::vector<std::uint8_t>> bytes = read_file(file, kLargestRecords);
+    if (!bytes) return bytes.error();
+    Result<AssetRecords> records = parse_asset_records(text_of(bytes.value()), file.string());
+    if (!records) return records.error();
+    if (records.value().is_cut_off)
+      console.warning(fmt::format("{}: the last record is cut off and left out", file.string()));
+    for (AssetRecord& record : records.value().records) all.push_back(std::move(record));
+  }
+  return all;
+}
+
+std::string merged_text(const MergedRecords& merged) {
+  std::string text;
+  for (const AssetRecord& record : merged.records) text += record.line + "\n";
+  Json summary{{"schema", "sqmap.merge/1"}, {"type", "summary"}};
+  for (const auto& [outcome, count] : merged.outcomes) summary["outcomes"][outcome] = count;
+  summary["missing"] = merged.missing;
+  summary["unplanned"] = merged.unplanned;
+  summary["conflicting"] = merged.conflicting;
+  summary["duplicates"] = merged.duplicate_count;
+  return text + json_line(summary);
+}
+
+Exit run_merge(Console& console, const MergeArguments& arguments) {
+  const auto refuse = [&](const Error& error) {
+    console.error(error.remedy.empty() ? error.finding : error.finding + "; " + error.remedy);
+    return exit_for(error.status);
+  };
+  std::optional<std::vector<PlannedAsset>> plan;
+  if (!arguments.plan.empty()) {
+    const Result<std::vector<std::uint8_t>> bytes = read_file(arguments.plan, kLargestRecords);
+    if (!bytes) return refuse(bytes.error());
+    Result<std::vector<PlannedAsset>> parsed = parse_plan(text_of(bytes.value()), arguments.plan.string());
+    if (!parsed) return refuse(parsed.error());
+    plan = std::move(parsed).value();
+  }
+  Result<std::vector<AssetRecord>> records = read_records(console, arguments.records);
+  if (!records) return refuse(records.error());
+  const MergedRecords merged = merge_records(std::move(records).value(), plan ? &*plan : nullptr);
+
+  for (const std::string& output : merged.missing) console.error(output + ": no record; run its shard again");
+  for (const std::string& output : merged.conflicting)
+    console.error(output + ": two runs made different bundles; bake it again, with one version of sqbake");
+  for (const std::string& output : merged.unplanned)
+    console.warning(output + ": has a record, but is not in the plan");
+  for (const AssetRecord& record : merged.records)
+    if (!record.has_bundle())
+      console.error(fmt::format("{}: {}: {}", record.input, record.outcome, record.finding));
+
+  const std::string text = merged_text(merged);
+  if (arguments.output.empty() || arguments.output == "-") {
+    console.out(text);
+  } else if (const Outcome written = write_file(arguments.output, text); !written) {
+    return refuse(written.error());
+  }
+  if (!arguments.report.empty())
+    if (const Outcome written = write_file(arguments.report, report_page(merged.records, {})); !written)
+      return refuse(written.error());
+  return merged.is_complete() ? Exit::kOk : Exit::kSomeFailed;
+}
+
+}  // namespace
+
+std::function<Exit(Console&)> declare_merge(CLI::App& app) {
+  const auto args = std::make_shared<MergeArguments>();
+  app.description(
+      "Joins the records of several runs, such as the shards of one: one record a bundle, the best and "
+      "latest. Says\n"
+      "which assets of the plan have none, and for which two runs disagree; then, or where an asset has no "
+      "bundle,\n"
+      "it exits with 1.\n"
+      "\n"
+      "Examples:\n"
+      "  sqbake merge shard-*.ndjson -o all.ndjson --plan plan.ndjson --report all.html\n");
+  app.add_option("RECORDS", args->records, "What `sqbake bake --format ndjson` wrote, the oldest first")
+      ->required();
+  app.add_option("-o,--output", args->output, "Joined records (default: standard output)")
+      ->type_name("FILE.ndjson");
+  app.add_option("--plan", args->plan, "What `sqbake plan --format ndjson` wrote: all that must be there")
+      ->type_name("FILE.ndjson");
+  app.add_option("--report", args->report, "Also write the page that `sqbake report` makes")
+      ->type_name("FILE.html");
+  return [args](Console& console) { return run_merge(console, *args); };
+}
+
+}  // namespace sqmap::apps

@@ -1,0 +1,110 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "../../common/json_text.hpp"
+#include "../commands.hpp"
+#include "../job_list.hpp"
+#include "shard_jobs.hpp"
+
+namespace sqmap::apps {
+namespace {
+
+struct PlanArguments {
+  JobRequest request;
+  std::uint32_t shards = 1;
+  std::optional<std::string> shard;
+  std::string format = "text";
+};
+
+Exit run_plan(Console& console, const PlanArguments& arguments) {
+  const auto refuse = [&](const Error& error) {
+    console.error(error.remedy.empty() ? error.finding : error.finding + "; " + error.remedy);
+    return exit_for(error.status);
+  };
+  std::optional<Shard> only;
+  if (arguments.shard) {
+    const Result<Shard> shard = parse_shard(*arguments.shard);
+    if (!shard) return refuse(shard.error());
+    only = shard.value();
+  }
+  const Result<JobList> list = list_jobs(arguments.request);
+  if (!list) return refuse(list.error());
+  const std::uint32_t count = only ? only->count : arguments.shards;
+  const std::vector<std::uint32_t> shard_of = shards_of(list.value(), count);
+
+  struct Sum {
+    std::size_t assets = 0;
+    std::uint64_t cost = 0;
+  };
+  std::vector<Sum> sums(count);
+  for (std::size_t k = 0; k < shard_of.size(); ++k) {
+    const Job& job = list.value().jobs[k];
+    const std::uint64_t cost = estimated_cost(job.input_bytes);
+    ++sums[shard_of[k]].assets;
+    sums[shard_of[k]].cost += cost;
+    if (only && shard_of[k] != only->index) continue;
+    if (arguments.format == "ndjson") {
+      console.out(json_line({{"schema", "sqmap.plan/1"},
+                             {"type", "plan"},
+                             {"input", job.input.string()},
+                             {"output", job.output.string()},
+                             {"input_bytes", job.input_bytes},
+                             {"cost", cost},
+                             {"shard", shard_of[k] + 1},
+                             {"shards", count}}));
+    } else if (only) {
+      console.out(fmt::format("{} -> {}\n", job.input.string(), job.output.string()));
+    }
+  }
+  if (arguments.format == "text" && !only) {
+    console.out(fmt::format("{:>8} {:>8} {:>14}\n", "shard", "assets", "cost"));
+    for (std::uint32_t shard = 0; shard < count; ++shard)
+      console.out(fmt::format("{:>8} {:>8} {:>14}\n", fmt::format("{}/{}", shard + 1, count),
+                              sums[shard].assets, sums[shard].cost));
+  }
+  return Exit::kOk;
+}
+
+}  // namespace
+
+std::function<Exit(Console&)> declare_plan(CLI::App& app) {
+  const auto args = std::make_shared<PlanArguments>();
+  JobRequest& request = args->request;
+  app.description(
+      "Deals meshes out to machines: prints what `sqbake bake` would bake, what each is expected to cost, "
+      "and in\n"
+      "which shard. Every machine that sees the same meshes gets the same plan; `sqbake bake --shard I/N` "
+      "bakes one\n"
+      "shard of it, `sqbake merge` joins the records.\n"
+      "\n"
+      "Examples:\n"
+      "  sqbake plan models/ --recursive --out-dir bundles/ --shards 8\n"
+      "  sqbake plan models/ --recursive --out-dir bundles/ --shards 8 --format ndjson > plan.ndjson\n"
+      "  sqbake plan models/ --recursive --out-dir bundles/ --shard 3/8\n");
+  app.add_option("INPUT", request.inputs, "Mesh files, folders, patterns and @lists of them");
+  app.add_option("--manifest", request.manifest, "As of `sqbake bake`")->type_name("FILE.toml");
+  app.add_option("--out-dir", request.out_dir, "As of `sqbake bake`")->type_name("DIR")->required();
+  app.add_flag("--recursive", request.recursive, "Look below the folders named, too");
+  app.add_flag("--keep-extension", request.keep_extension, "Call the bundles NAME.off.h5, not NAME.h5");
+  app.add_option("--config", request.config.project, "As of `sqbake bake`")->type_name("FILE.toml");
+  app.add_flag("!--no-config", request.config.use_files, "As of `sqbake bake`");
+  CLI::Option* shards = app.add_option("--shards", args->shards, "Number of shards (default 1)")
+                            ->check(CLI::Range(1, 1'000'000).description(""))
+                            ->type_name("N");
+  app.add_option("--shard", args->shard, "Only one of N; auto: as the job array of Slurm or Kubernetes says")
+      ->excludes(shards)
+      ->type_name("I/N");
+  app.add_option("--format", args->format, "text or ndjson, one line a mesh (default text)")
+      ->check(CLI::IsMember({"text", "ndjson"}).description(""))
+      ->type_name("FORMAT");
+  return [args](Console& console) { return run_plan(console, *args); };
+}
+
+}  // namespace sqmap::apps

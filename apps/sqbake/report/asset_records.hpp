@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <cstdint>
+#include <limits>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "sqmap/asset/result.hpp"
+
+namespace sqmap::apps {
+
+/// What reports and merges need of one record of `sqbake bake --format ndjson`.
+struct AssetRecord {
+  std::string line;  ///< the record itself, without its line feed
+  std::string input, output, outcome;
+  bool is_cached = false;
+  double seconds{};
+  std::string finding, remedy;       ///< of a failure
+  std::vector<std::string> remarks;  ///< why it is degraded, warnings
+  std::uint64_t parts{}, bytes{}, faces{};
+  double r_max_m = std::numeric_limits<double>::quiet_NaN();
+  /// Of the finest level and highest layer, in percent of R_max or of points; NaN where nothing was measured.
+  double eq35_percent = r_max_m, depth_mean_percent = r_max_m, wrong_percent = r_max_m;
+  std::vector<std::pair<std::string, double>> stages;  ///< seconds by stage
+
+  bool has_bundle() const { return outcome == "ok" || outcome == "degraded"; }
+};
+
+struct AssetRecords {
+  std::vector<AssetRecord> records;
+  bool is_cut_off = false;  ///< the last line has no end: its writer was killed; it is left out
+};
+
+/// The asset records of an NDJSON text; other records (summaries) are passed over. `source` names it in
+/// errors. Errors: kInvalidAsset with the number of the line.
+Result<AssetRecords> parse_asset_records(std::string_view text, std::string_view source);
+
+}  // namespace sqmap::apps

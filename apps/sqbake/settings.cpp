@@ -1,0 +1,200 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "settings.hpp"
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <utility>
+
+#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+
+namespace sqmap::apps {
+namespace {
+
+// With much less a worker cannot even say that it has too little.
+constexpr std::uint64_t kLeastMemory_bytes = std::uint64_t{16} << 20;
+
+template <class Value>
+using Names = std::span<const std::pair<std::string_view, Value>>;
+
+constexpr std::array<std::pair<std::string_view, bake::UpAxis>, 3> kUpNames{
+    {{"x", bake::UpAxis::kX}, {"y", bake::UpAxis::kY}, {"z", bake::UpAxis::kZ}}};
+constexpr std::array<std::pair<std::string_view, bake::Repair>, 3> kRepairNames{
+    {{"none", bake::Repair::kNone}, {"safe", bake::Repair::kSafe}, {"all", bake::Repair::kAll}}};
+constexpr std::array<std::pair<std::string_view, Fallback>, 2> kFallbackNames{
+    {{"none", Fallback::kNone}, {"superquadric", Fallback::kSuperquadric}}};
+
+template <class Value>
+Outcome choose(std::string_view text, Names<Value> names, Value& value) {
+  std::string list;
+  for (const auto& [name, named] : names) {
+    if (name == text) {
+      value = named;
+      return Done{};
+    }
+    list += (list.empty() ? "" : ", ") + std::string(name);
+  }
+  return Error{Status::kBadOption, fmt::format("`{}`, must be one of {}", text, list), ""};
+}
+
+template <class Value>
+std::string name_of(Value value, Names<Value> names) {
+  for (const auto& [name, named] : names)
+    if (named == value) return std::string(name);
+  return "";
+}
+
+Outcome apply_unit(AssetOptions& options, std::string_view text) {
+  const Result<double> metres = parse_unit(text);
+  if (!metres) return metres.error();
+  options.bake.read.metres_per_unit = metres.value();
+  return Done{};
+}
+
+Outcome apply_up(AssetOptions& options, std::string_view text) {
+  return choose<bake::UpAxis>(text, kUpNames, options.bake.read.up);
+}
+
+Outcome apply_repair(AssetOptions& options, std::string_view text) {
+  return choose<bake::Repair>(text, kRepairNames, options.bake.repair.policy);
+}
+
+Outcome apply_max_error(AssetOptions& options, std::string_view text) {
+  const Result<ErrorTarget> target = parse_error_target(text);
+  if (!target) return target.error();
+  options.max_error = target.value();
+  if (target.value().percent > 0) options.bake.max_error_percent = target.value().percent;
+  return Done{};
+}
+
+Outcome apply_max_parts(AssetOptions& options, std::string_view text) {
+  std::uint32_t count = 0;
+  const auto [end, code] = std::from_chars(text.data(), text.data() + text.size(), count);
+  if (code != std::errc{} || end != text.data() + text.size())
+    return Error{Status::kBadOption, fmt::format("`{}`, must be a number in [1, {}]", text, kMaxParts), ""};
+  options.bake.max_parts = count;  // BakeOptions::check knows the range
+  return Done{};
+}
+
+Outcome apply_max_bytes(AssetOptions& options, std::string_view text) {
+  const Result<std::uint64_t> bytes = parse_bytes(text);
+  if (!bytes) return bytes.error();
+  options.bake.max_bytes = bytes.value();
+  return Done{};
+}
+
+Outcome apply_timeout(AssetOptions& options, std::string_view text) {
+  const Result<double> seconds = parse_duration(text);
+  if (!seconds) return seconds.error();
+  options.timeout_s = seconds.value();
+  return Done{};
+}
+
+Outcome apply_memory(AssetOptions& options, std::string_view text) {
+  if (text == "none") {
+    options.memory_bytes = 0;
+    return Done{};
+  }
+  const Result<std::uint64_t> bytes = parse_bytes(text);
+  if (!bytes) return Error{Status::kBadOption, bytes.error().finding + ", or none", ""};
+  if (bytes.value() < kLeastMemory_bytes)
+    return Error{Status::kBadOption,
+                 fmt::format("`{}`, must be at least 16M: a worker needs more by itself", text), ""};
+  options.memory_bytes = bytes.value();
+  return Done{};
+}
+
+Outcome apply_fallback(AssetOptions& options, std::string_view text) {
+  return choose<Fallback>(text, kFallbackNames, options.fallback);
+}
+
+constexpr AssetOptions kDefaults;
+
+std::string default_unit() { return "m"; }
+std::string default_up() { return name_of<bake::UpAxis>(kDefaults.bake.read.up, kUpNames); }
+std::string default_repair() { return name_of<bake::Repair>(kDefaults.bake.repair.policy, kRepairNames); }
+std::string default_max_error() { return fmt::format("{}%", kDefaults.bake.max_error_percent); }
+std::string default_max_parts() { return fmt::to_string(kDefaults.bake.max_parts); }
+std::string default_max_bytes() { return fmt::format("{}K", kDefaults.bake.max_bytes / 1024); }
+std::string default_timeout() { return fmt::format("{}s", kDefaults.timeout_s); }
+std::string default_memory() { return "none"; }
+std::string default_fallback() { return name_of<Fallback>(kDefaults.fallback, kFallbackNames); }
+
+constexpr std::array<Setting, 9> kSettings{{
+    {"unit", "UNIT", "Unit of the coordinates: m, cm, mm, um, in, ft or a number of metres", default_unit,
+     apply_unit},
+    {"up", "AXIS", "Axis of the input that points up: x, y, z; turned to z", default_up, apply_up},
+    {"repair", "POLICY",
+     "none: drop only faces without area; safe: also weld, drop duplicates,\norient; all: also fill small "
+     "holes",
+     default_repair, apply_repair},
+    {"max-error", "PCT|LENGTH",
+     "Stop refining at this mean error of eq. 35: a percentage of R_max, the\nlargest distance between two "
+     "vertices, or a length such as 0.2mm",
+     default_max_error, apply_max_error},
+    {"max-parts", "COUNT", "Use at most this many parts", default_max_parts, apply_max_parts},
+    {"max-bytes", "BYTES", "Encoded size of the maps, about; K, M and G are powers of 1024",
+     default_max_bytes, apply_max_bytes},
+    {"timeout", "TIME", "End the bake of a mesh after this time: 90s, 5m, 2h or none", default_timeout,
+     apply_timeout},
+    {"memory", "BYTES", "Memory that the bake of a mesh may take, e.g. 2G, or none", default_memory,
+     apply_memory},
+    {"fallback", "KIND",
+     "For a mesh that ran into a limit, crashed or could not be baked:\nnone, or superquadric: bake one a "
+     "component, uncut, marked as degraded",
+     default_fallback, apply_fallback},
+}};
+
+}  // namespace
+
+std::span<const Setting> all_settings() { return kSettings; }
+
+const Setting* find_setting(std::string_view name) {
+  const auto entry =
+      std::ranges::find_if(kSettings, [&](const Setting& setting) { return setting.name == name; });
+  return entry == kSettings.end() ? nullptr : &*entry;
+}
+
+SettingTexts texts_of(const SettingValues& values) {
+  SettingTexts texts;
+  for (const auto& [name, value] : values) texts.emplace(name, value.text);
+  return texts;
+}
+
+Result<AssetOptions> options_from(const SettingTexts& texts) {
+  AssetOptions options;
+  for (const auto& [name, text] : texts) {
+    const Setting* setting = find_setting(name);
+    if (setting == nullptr) return Error{Status::kBadOption, fmt::format("unknown setting `{}`", name), ""};
+    if (const Outcome ok = setting->apply(options, text); !ok)
+      return Error{Status::kBadOption, fmt::format("{}: {}", name, ok.error().finding), ""};
+  }
+  if (const Outcome ok = options.bake.check(); !ok) return ok.error();
+  return options;
+}
+
+void add_setting_options(CLI::App& app, std::span<const std::string_view> names, SettingTexts& texts) {
+  for (const std::string_view name : names) {
+    const Setting& setting = *find_setting(name);
+    const std::string option = fmt::format("--{}", setting.name);
+    app.add_option_function<std::string>(
+           option,
+           [&setting, &texts, option](const std::string& text) {
+             AssetOptions scratch;
+             if (const Outcome ok = setting.apply(scratch, text); !ok)
+               throw CLI::ValidationError(option, ok.error().finding);
+             texts[setting.name] = text;
+           },
+           fmt::format("{} (default {})", setting.help, setting.default_text()))
+        ->type_name(setting.type_name);
+  }
+}
+
+void add_all_setting_options(CLI::App& app, SettingTexts& texts) {
+  std::array<std::string_view, kSettings.size()> names{};
+  std::ranges::transform(kSettings, names.begin(), &Setting::name);
+  add_setting_options(app, names, texts);
+}
+
+}  // namespace sqmap::apps

@@ -1,0 +1,113 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The records of sqbake keep to apps/sqbake/bake.schema.json, and the cache gives the bytes of a bake."""
+import json
+import os
+import pty
+import re
+import subprocess
+import unittest
+from pathlib import Path
+
+import jsonschema
+
+import support
+from support import ROUGH, TIMEOUT_S, FolderTest, box, command, sphere, write_off
+
+SCHEMA = json.loads((Path(os.environ["SQMAP_SOURCE_DIR"]) / "apps/sqbake/bake.schema.json").read_text(encoding="utf-8"))
+
+
+def run(*arguments):
+    return support.run(*arguments, errors="replace")  # a file name is any bytes, and messages name files
+
+
+class Records(FolderTest):
+    def setUp(self):
+        super().setUp()
+        jsonschema.Draft7Validator.check_schema(SCHEMA)
+        self.validator = jsonschema.Draft7Validator(SCHEMA)
+        self.models = self.folder / "models"
+        self.models.mkdir()
+        write_off(self.models / "ball.off", sphere(1))
+        write_off(self.models / "open.off", (box()[0], box()[1][2:]))
+        (self.models / "broken.off").write_text("OFF\n1 1 0\n", encoding="ascii")
+        write_off(self.models / os.fsdecode(b"caf\xe9.off"), box(9000, 9000, 9000))  # no UTF-8; suspiciously large
+        self.out = self.folder / "out"
+
+    def valid(self, text):
+        record = json.loads(text)
+        self.validator.validate(record)
+        return record
+
+    def test_every_kind_of_record_keeps_to_the_schema(self):
+        options = (*ROUGH, "--repair", "none", "--out-dir", self.out)
+        lines = run("sqbake", "bake", self.models, *options, "--format", "ndjson").stdout.splitlines()
+        records = [self.valid(line) for line in lines]
+        self.assertEqual([r.get("outcome", r["type"]) for r in records], ["ok", "failed", "ok", "degraded", "summary"])
+        self.assertEqual([len(r["warnings"]) for r in records[:4]], [0, 0, 1, 0])
+        self.assertEqual((records[4]["ok"], records[4]["degraded"], records[4]["failed"]), (2, 1, 1))
+        self.valid(run("sqbake", "bake", self.models, *options, "--format", "json").stdout)
+        late = run("sqbake", "bake", self.models, *options, "--format", "ndjson", "--timeout", "0.001s", "--fail-fast",
+                   "-j1")
+        self.assertEqual([self.valid(line).get("outcome") for line in late.stdout.splitlines()],
+                         ["timeout"] + 3 * ["cancelled"] + [None])
+        for line in run("sqbake", "bake", self.models, *options, "-n", "--format", "ndjson").stdout.splitlines():
+            self.valid(line)
+        self.valid(run("sqbake", "bake", self.models, *options, "-n", "--format", "json").stdout)
+
+    def test_the_schema_refuses_what_is_no_record(self):
+        good = self.valid(run("sqbake", "bake", self.models / "ball.off", *ROUGH, "-o", self.folder / "a.h5", "--format",
+                              "ndjson").stdout.splitlines()[0])
+        for change in ({"outcome": "fine"}, {"outcome": "failed"}, {"parts": 0}, {"unknown": 1}, {"schema": "x"},
+                       {"mesh": {}}):
+            with self.subTest(change=change), self.assertRaises(jsonschema.ValidationError):
+                self.validator.validate({**good, **change})
+
+    def test_the_cache_gives_the_bytes_of_a_bake_and_the_records_of_one(self):
+        options = (*ROUGH, "--repair", "none", "--format", "ndjson", "--cache", self.folder / "cache", "--explain")
+        cold = run("sqbake", "bake", self.models, *options, "--out-dir", self.folder / "cold")
+        again = run("sqbake", "bake", self.models, *options, "--out-dir", self.folder / "cold")
+        other = run("sqbake", "bake", self.models, *options, "--out-dir", self.folder / "other")
+        for result in (cold, again, other):
+            self.assertEqual(result.returncode, 1)
+        cold, again, other = ([self.valid(line) for line in r.stdout.splitlines()] for r in (cold, again, other))
+        self.assertEqual([r["cached"] for r in again], [True, False, True, True, 3])
+        drop = ("cached", "seconds", "stages", "output", "error")
+        for first, second, third in zip(cold[:4], again, other):
+            bare = [{k: v for k, v in r.items() if k not in drop} for r in (first, second, third)]
+            self.assertEqual(bare[0], bare[1])
+            self.assertEqual(bare[0], bare[2])
+        for bundle in (self.folder / "cold").iterdir():
+            self.assertEqual((self.folder / "other" / bundle.name).read_bytes(), bundle.read_bytes())
+
+    def test_a_fallback_or_a_limit_is_never_kept(self):
+        cache = ("--cache", self.folder / "cache", "--format", "ndjson")
+        source = self.models / "ball.off"
+        self.assert_exit(run("sqbake", "bake", source, "-o", self.folder / "a.h5", *cache, "--timeout", "0.001s"), 8)
+        result = run("sqbake", "bake", source, *ROUGH, "-o", self.folder / "a.h5", *cache)
+        self.assertFalse(json.loads(result.stdout.splitlines()[0])["cached"])
+
+
+class Terminal(FolderTest):
+    def test_a_terminal_sees_count_rate_and_time_left(self):
+        for name in "abcd":
+            write_off(self.folder / f"{name}.off", sphere(3))
+        master, slave = pty.openpty()
+        environment = {**{k: v for k, v in os.environ.items() if k not in ("CI", "NO_COLOR")}, "TERM": "xterm"}
+        process = subprocess.Popen(command("sqbake", "bake", self.folder, *ROUGH, "--out-dir", self.folder / "out", "-j1"),
+                                   stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=slave, env=environment)
+        os.close(slave)
+        shown = b""
+        try:
+            while chunk := os.read(master, 65536):
+                shown += chunk
+        except OSError:
+            pass  # how a terminal ends
+        os.close(master)
+        self.assertEqual(process.wait(timeout=TIMEOUT_S), 0)
+        self.assertRegex(shown.decode("utf-8"), r"\[2/4\] \w\.off  \w+ \d+ %  [\d.]+/(?:s|min)  \d+:\d\d:\d\d left")
+        last = re.split(r"\r\x1b\[K", shown.decode("utf-8"))[-1]
+        self.assertIn("4 of 4 baked", last)
+
+
+if __name__ == "__main__":
+    unittest.main()

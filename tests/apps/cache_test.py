@@ -1,0 +1,124 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`sqbake bake` with a cache bakes nothing twice, says why it bakes, and never suffers from the cache."""
+import json
+import os
+import shutil
+import unittest
+
+from support import FolderTest, ROUGH, box, run, sphere, write_off
+
+
+class Cache(FolderTest):
+    def setUp(self):
+        super().setUp()
+        self.models, self.out, self.cache = (self.folder / name for name in ("models", "out", "cache"))
+        self.models.mkdir()
+        for k in range(4):
+            write_off(self.models / f"ball {k}.off", sphere(1, 1 + k))
+
+    def bake(self, *options, models=None, out=None, cache=None, code=0):
+        """Records by file name."""
+        result = run("sqbake", "bake", models or self.models, "--out-dir", out or self.out, "--cache",
+                     cache or self.cache, "--format", "ndjson", "--explain", *ROUGH, *options)
+        self.assert_exit(result, code)
+        self.stderr = result.stderr
+        records = [json.loads(line) for line in result.stdout.splitlines()]
+        return {os.path.basename(r["input"]): r for r in records if r["type"] == "asset"}
+
+    def baked(self, *options, **more):
+        return sorted(name for name, record in self.bake(*options, **more).items() if not record["cached"])
+
+    def bundles(self, out=None):
+        return {p.name: p.read_bytes() for p in (out or self.out).rglob("*.h5")}
+
+    def stamps(self):
+        return {p.name: (p.stat().st_mtime_ns, p.stat().st_ino) for p in self.out.rglob("*.h5")}
+
+    def test_bakes_once_what_does_not_change(self):
+        names = [f"ball {k}.off" for k in range(4)]
+        self.assertEqual(self.baked(), names)
+        cold, stamps = self.bundles(), self.stamps()
+        self.assertEqual(self.baked(), [])
+        for name in names:
+            (self.models / name).touch()
+        self.assertEqual(self.baked(), [])
+        self.assertEqual((self.bundles(), self.stamps()), (cold, stamps))
+
+        write_off(self.models / "ball 2.off", box())
+        self.assertEqual(self.baked(), ["ball 2.off"])
+        self.assertIn("ball 2.off: mesh ball 2.off changed", self.stderr)
+
+        (self.models / "ball 1.off.sqbake.toml").write_text("max-parts = 3\n", encoding="ascii")
+        self.assertEqual(self.baked(), ["ball 1.off"])
+        self.assertRegex(self.stderr, r"ball 1.off: option \S*max.parts\S*: \S*3\S*, was \S*24")
+        self.assertEqual(self.baked("--unit", "mm"), names)
+        self.assertEqual(self.baked(), [])
+
+    def test_a_hit_has_the_bytes_and_the_record_of_a_cold_bake_without_cache(self):
+        self.bake()
+        cold = self.folder / "cold"
+        without = run("sqbake", "bake", self.models, "--out-dir", cold, "--no-cache", "--format", "ndjson", *ROUGH)
+        self.assert_exit(without, 0)
+        shutil.rmtree(self.out)
+        hits = self.bake()
+        self.assertTrue(all(record["cached"] for record in hits.values()))
+        self.assertEqual(self.bundles(), self.bundles(cold))
+        for line in without.stdout.splitlines()[:-1]:
+            record = json.loads(line)
+            hit = hits[os.path.basename(record["input"])]
+            for name in ("parts", "bytes", "errors", "mesh", "outcome", "eq35_percent"):
+                self.assertEqual(hit[name], record[name])
+
+    def test_a_shared_cache_serves_another_folder_with_its_own_names(self):
+        self.bake()
+        moved, out = self.folder / "elsewhere", self.folder / "out2"
+        shutil.copytree(self.models, moved)
+        records = self.bake(models=moved, out=out)
+        for name, record in records.items():
+            self.assertTrue(record["cached"])
+            self.assertEqual(record["input"], str(moved / name))
+            self.assertEqual(record["output"], str(out / name.replace(".off", ".h5")))
+        self.assertEqual(self.bundles(out), self.bundles())
+
+    def test_a_broken_cache_costs_time_and_nothing_else(self):
+        self.bake()
+        cold = self.bundles()
+        for kind in ("objects", "results", "outputs"):
+            for path in (self.cache / "v1" / kind).rglob("*"):
+                if path.is_file():
+                    path.write_bytes(path.read_bytes()[:50])
+            shutil.rmtree(self.out)
+            self.assertEqual(len(self.baked()), 0 if kind == "outputs" else 4, kind)
+            self.assertEqual(self.bundles(), cold)
+        (self.folder / "file").write_text("no folder", encoding="ascii")
+        self.assertEqual(len(self.baked(cache=self.folder / "file")), 4)
+        self.assertIn("warning", self.stderr)
+
+    def test_failures_are_not_cached(self):
+        (self.models / "bad.off").write_text("OFF\n3 0 0\n", encoding="ascii")
+        for _ in range(2):
+            self.assertEqual(self.bake(code=1)["bad.off"]["outcome"], "failed")
+
+    def test_stats_verify_and_gc_tell_what_is_there(self):
+        self.bake()
+        show = lambda *arguments: run("sqbake", "cache", *arguments, "--cache", self.cache, "--format", "json")
+        stats = json.loads(show("stats").stdout)
+        self.assertEqual((stats["results"], stats["bundles"], stats["outputs"]), (4, 4, 4))
+        files = [p for p in (self.cache / "v1").rglob("*") if p.is_file()]
+        self.assertEqual(stats["bytes"], sum(p.stat().st_size for p in files))
+        self.assert_exit(show("verify"), 0)
+        damaged = next(p for p in (self.cache / "v1" / "objects").rglob("*") if p.is_file())
+        damaged.write_bytes(damaged.read_bytes() + b"x")
+        result = show("verify")
+        self.assert_exit(result, 1)
+        self.assertIn(damaged.name, result.stdout)
+        self.assert_exit(show("verify"), 0)
+        self.assert_exit(show("gc", "--max-size", "1"), 0)
+        stats = json.loads(show("stats").stdout)
+        self.assertEqual((stats["results"], stats["bundles"]), (0, 0))
+        missing = run("sqbake", "cache", "stats", "--cache", self.folder / "none")
+        self.assert_exit(missing, 3)
+
+
+if __name__ == "__main__":
+    unittest.main()
