@@ -205,8 +205,9 @@ Result<bool> draw_maps(Asset& asset, const std::vector<double>& areas_m2, const 
   double least_m = std::numeric_limits<double>::infinity();
   bool by_budget = false;
   MapTarget stricter = target;
+  MapDrawer drawer(asset.parts, areas_m2, queries);
   for (int round = 0; round < kMapRounds; ++round, stricter.error_m *= kStricter) {
-    const bool budget_decided = map_parts(asset.parts, areas_m2, queries, stricter);
+    const bool budget_decided = drawer.draw(asset.parts, stricter);
     tbb::parallel_for(std::size_t{0}, asset.parts.size(), [&](std::size_t k) {
       add_vertex_samples(asset.parts[k], queries, kVertexTolerance * target.error_m);
     });

@@ -31,6 +31,12 @@ struct MeshQueries {
   const RayTracer& rays;
   const Oracle& oracle;
   bool is_closed;
+
+  /// Winding number of the mesh at p, rounded. `line_hits`: the crossings of any line through p, t_m = 0 at
+  /// p; of a closed mesh they tell it at once.
+  int winding(const Vec3d& p_m, const std::vector<RayTracer::Hit>& line_hits) const;
+  /// Negative inside [m].
+  double signed_distance(const Vec3d& p_m) const;
 };
 
 /// Traces the inward ray of every node of a rows x cols map through the whole mesh (paper 4.1.2 with the
