@@ -237,13 +237,13 @@ Provenance provenance(const SourceMesh& source, const BakeOptions& options) {
 
 }  // namespace
 
-Result<BakeResult> bake(const SourceMesh& source, const BakeOptions& options, const Progress& progress) {
-  if (auto outcome = options.check(); !outcome) return outcome.error();
+Result<BakeResult> bake(const SourceMesh& source, const BakeOptions& asked, const Progress& progress) {
+  if (auto outcome = asked.check(); !outcome) return outcome.error();
   const auto cancelled = [] { return Error{Status::kCancelled, "cancelled", ""}; };
   Stages stages(progress);
 
   stages.begin("repair");
-  auto repaired = check_and_repair(source, options.repair);
+  auto repaired = check_and_repair(source, asked.repair);
   if (!repaired) return repaired.error();
   const PreparedMesh& prepared = repaired.value();
 
@@ -252,6 +252,8 @@ Result<BakeResult> bake(const SourceMesh& source, const BakeOptions& options, co
   const RayTracer rays(prepared.mesh);
   const MeshQueries queries{prepared.mesh, rays, oracle, prepared.record.is_closed};
   const double r_max_m = largest_vertex_distance(prepared.mesh);
+  BakeOptions options = asked;  // the target as a share of R_max, which is known only now
+  if (asked.max_error_m > 0) options.max_error_percent = std::min(100.0, 100 * asked.max_error_m / r_max_m);
   if (progress.stop()) return cancelled();
 
   stages.begin("decompose");
@@ -284,7 +286,7 @@ Result<BakeResult> bake(const SourceMesh& source, const BakeOptions& options, co
   if (!by_budget) return by_budget.error();
   if (by_budget.value()) result.stopped_by = "bytes";
   asset.mesh = prepared.record;
-  asset.provenance = provenance(source, options);
+  asset.provenance = provenance(source, asked);
   if (progress.stop()) return cancelled();
 
   stages.begin("measure");
