@@ -250,7 +250,8 @@ Result<BakeResult> bake(const SourceMesh& source, const BakeOptions& asked, cons
   stages.begin("index");
   const Oracle oracle(prepared.mesh);
   const RayTracer rays(prepared.mesh);
-  const MeshQueries queries{prepared.mesh, rays, oracle, prepared.record.is_closed};
+  const OpenPlaces open(prepared.mesh);
+  const MeshQueries queries{prepared.mesh, rays, oracle, open};
   const double r_max_m = largest_vertex_distance(prepared.mesh);
   BakeOptions options = asked;  // the target as a share of R_max, which is known only now
   if (asked.max_error_m > 0) options.max_error_percent = std::min(100.0, 100 * asked.max_error_m / r_max_m);
@@ -264,8 +265,8 @@ Result<BakeResult> bake(const SourceMesh& source, const BakeOptions& asked, cons
   const Mesh fine = fine_mesh(prepared.mesh, kLongestEdge * r_max_m);
   const Decomposition fine_segments = on_fine_faces(std::move(segments).value(), fine);
   auto [set, whole] = SolidSet::whole(fine);
-  auto refined = refine(set, close_segments(set, whole, fine_segments),
-                        {fine, rays, oracle, queries.is_closed}, r_max_m, options, progress);
+  auto refined = refine(set, close_segments(set, whole, fine_segments), {fine, rays, oracle, open}, r_max_m,
+                        options, progress);
   if (!refined) return refined.error();
   std::vector<Piece>& pieces = refined.value().pieces;
   sort_pieces(pieces);

@@ -76,8 +76,9 @@ class Reach {
 
 }  // namespace
 
-int MeshQueries::winding(const Vec3d& p_m, const std::vector<RayTracer::Hit>& line_hits) const {
-  if (is_closed) {
+int MeshQueries::winding(const Vec3d& p_m, const Vec3d& direction,
+                         const std::vector<RayTracer::Hit>& line_hits) const {
+  if (!open.can_mislead(p_m, direction)) {
     int ahead = 0, behind = 0;
     for (const auto& hit : line_hits) (hit.t_m < 0 ? behind : ahead) += hit.entering ? -1 : 1;
     // What leaves the material ahead must have been entered before.
@@ -87,11 +88,13 @@ int MeshQueries::winding(const Vec3d& p_m, const std::vector<RayTracer::Hit>& li
 }
 
 double MeshQueries::signed_distance(const Vec3d& p_m) const {
-  const double distance_m = oracle.nearest(p_m).distance_m;
-  std::vector<RayTracer::Hit> hits;
   // Any direction serves; this one lies in no plane that models are aligned with.
-  if (is_closed) rays.trace_line(p_m, normalized(Vec3d{0.3217, 0.5431, 0.7757}), hits);
-  return winding(p_m, hits) > 0 ? -distance_m : distance_m;
+  const Vec3d direction = normalized(Vec3d{0.3217, 0.5431, 0.7757});
+  if (open.can_mislead(p_m, direction)) return oracle.signed_distance(p_m);
+  std::vector<RayTracer::Hit> hits;
+  rays.trace_line(p_m, direction, hits);
+  const double distance_m = oracle.nearest(p_m).distance_m;
+  return winding(p_m, direction, hits) > 0 ? -distance_m : distance_m;
 }
 
 RayField trace_map(const Superquadric& shape, const Pose& object_from_part, std::uint32_t rows,
@@ -114,7 +117,7 @@ RayField trace_map(const Superquadric& shape, const Pose& object_from_part, std:
                           const Vec3d p_m = turn.apply(grid.point(row, col)) + object_from_part.translation_m;
                           const Vec3d inward = -turn.apply(grid.normal(row, col));
                           queries.rays.trace_line(p_m, inward, hits);
-                          int winding = queries.winding(p_m, hits);
+                          int winding = queries.winding(p_m, inward, hits);
                           const double reach_m = reach.at(row, col);
                           out.start_inside.push_back(winding > 0 ? 1 : 0);
                           out.reach_m.push_back(reach_m);

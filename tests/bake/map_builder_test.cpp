@@ -21,8 +21,9 @@ struct Scene {
   Mesh mesh;
   RayTracer rays;
   Oracle oracle;
-  explicit Scene(Mesh m) : mesh(std::move(m)), rays(mesh), oracle(mesh) {}
-  MeshQueries queries() const { return {mesh, rays, oracle, true}; }
+  OpenPlaces open;
+  explicit Scene(Mesh m) : mesh(std::move(m)), rays(mesh), oracle(mesh), open(mesh) {}
+  MeshQueries queries() const { return {mesh, rays, oracle, open}; }
 };
 
 Part part_around(const Superquadric& shape) {
@@ -109,7 +110,11 @@ TEST(Quantise, CoincidingCrossingsKeepTheParity) {
 }
 
 TEST(MeshQueries, LinesTellTheSameInsideAsWindingNumbers) {
-  for (const Mesh& mesh : {test::torus(1, 0.3, 64, 32), test::hollow_box({1, 1, 1}, 0.25)}) {
+  Mesh pierced = test::sphere(1, 4);  // one small hole, where 5 faces are missing
+  pierced.faces.resize(pierced.faces.size() - 5);
+  Mesh bowl = test::sphere(1, 3);
+  std::erase_if(bowl.faces, [&](const auto& f) { return bowl.vertices_m[f[0]].z > 0.2; });
+  for (const Mesh& mesh : {test::torus(1, 0.3, 64, 32), test::hollow_box({1, 1, 1}, 0.25), pierced, bowl}) {
     const Scene scene(mesh);
     const MeshQueries queries = scene.queries();
     std::mt19937 random(5);
