@@ -205,8 +205,9 @@ Result<bool> draw_maps(Asset& asset, const std::vector<double>& areas_m2, const 
   double least_m = std::numeric_limits<double>::infinity();
   bool by_budget = false;
   MapTarget stricter = target;
+  MapDrawer drawer(asset.parts, areas_m2, queries);
   for (int round = 0; round < kMapRounds; ++round, stricter.error_m *= kStricter) {
-    const bool budget_decided = map_parts(asset.parts, areas_m2, queries, stricter);
+    const bool budget_decided = drawer.draw(asset.parts, stricter);
     tbb::parallel_for(std::size_t{0}, asset.parts.size(), [&](std::size_t k) {
       add_vertex_samples(asset.parts[k], queries, kVertexTolerance * target.error_m);
     });
@@ -236,21 +237,24 @@ Provenance provenance(const SourceMesh& source, const BakeOptions& options) {
 
 }  // namespace
 
-Result<BakeResult> bake(const SourceMesh& source, const BakeOptions& options, const Progress& progress) {
-  if (auto outcome = options.check(); !outcome) return outcome.error();
+Result<BakeResult> bake(const SourceMesh& source, const BakeOptions& asked, const Progress& progress) {
+  if (auto outcome = asked.check(); !outcome) return outcome.error();
   const auto cancelled = [] { return Error{Status::kCancelled, "cancelled", ""}; };
   Stages stages(progress);
 
   stages.begin("repair");
-  auto repaired = check_and_repair(source, options.repair);
+  auto repaired = check_and_repair(source, asked.repair);
   if (!repaired) return repaired.error();
   const PreparedMesh& prepared = repaired.value();
 
   stages.begin("index");
   const Oracle oracle(prepared.mesh);
   const RayTracer rays(prepared.mesh);
-  const MeshQueries queries{prepared.mesh, rays, oracle, prepared.record.is_closed};
+  const OpenPlaces open(prepared.mesh);
+  const MeshQueries queries{prepared.mesh, rays, oracle, open};
   const double r_max_m = largest_vertex_distance(prepared.mesh);
+  BakeOptions options = asked;  // the target as a share of R_max, which is known only now
+  if (asked.max_error_m > 0) options.max_error_percent = std::min(100.0, 100 * asked.max_error_m / r_max_m);
   if (progress.stop()) return cancelled();
 
   stages.begin("decompose");
@@ -261,8 +265,8 @@ Result<BakeResult> bake(const SourceMesh& source, const BakeOptions& options, co
   const Mesh fine = fine_mesh(prepared.mesh, kLongestEdge * r_max_m);
   const Decomposition fine_segments = on_fine_faces(std::move(segments).value(), fine);
   auto [set, whole] = SolidSet::whole(fine);
-  auto refined = refine(set, close_segments(set, whole, fine_segments),
-                        {fine, rays, oracle, queries.is_closed}, r_max_m, options, progress);
+  auto refined = refine(set, close_segments(set, whole, fine_segments), {fine, rays, oracle, open}, r_max_m,
+                        options, progress);
   if (!refined) return refined.error();
   std::vector<Piece>& pieces = refined.value().pieces;
   sort_pieces(pieces);
@@ -283,7 +287,7 @@ Result<BakeResult> bake(const SourceMesh& source, const BakeOptions& options, co
   if (!by_budget) return by_budget.error();
   if (by_budget.value()) result.stopped_by = "bytes";
   asset.mesh = prepared.record;
-  asset.provenance = provenance(source, options);
+  asset.provenance = provenance(source, asked);
   if (progress.stop()) return cancelled();
 
   stages.begin("measure");

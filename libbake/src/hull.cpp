@@ -117,7 +117,8 @@ class Quickhull {
           add_face(corner.at(side), corner.at((side + 1) % 3), p, beyond);
         }
       }
-      orphans.insert(orphans.end(), faces_[visible[i]].outside.begin(), faces_[visible[i]].outside.end());
+      // Not p: it lies in the planes of all new faces, which takes exact arithmetic to see.
+      std::ranges::remove_copy(faces_[visible[i]].outside, std::back_inserter(orphans), p);
       faces_[visible[i]].outside.clear();
     }
     for (Index f = first_new; f < faces_.size(); ++f) {  // around p: the face from b follows that from a to b
@@ -149,7 +150,8 @@ std::vector<bool> corners(const Points& points, const std::vector<Quickhull::Fac
   std::vector<bool> is_corner(points.size(), false);
   const auto same_plane = [&](const Quickhull::Face& f, const Quickhull::Face& g) {
     return std::all_of(g.corner.begin(), g.corner.end(), [&](Index i) {
-      return CGAL::coplanar(points[f.corner[0]], points[f.corner[1]], points[f.corner[2]], points[i]);
+      return std::ranges::count(f.corner, i) > 0 ||
+             CGAL::coplanar(points[f.corner[0]], points[f.corner[1]], points[f.corner[2]], points[i]);
     });
   };
   for (const Quickhull::Face& face : faces) {

@@ -9,6 +9,8 @@
 #include "sqmap/bake/mesh.hpp"
 #include "sqmap/bake/oracle.hpp"
 
+#include "open_places.hpp"
+
 namespace sqmap::bake {
 
 /// What the inward rays of one part meet, in double, before resolution and bits are chosen.
@@ -30,7 +32,13 @@ struct MeshQueries {
   const Mesh& mesh;
   const RayTracer& rays;
   const Oracle& oracle;
-  bool is_closed;
+  const OpenPlaces& open;
+
+  /// Winding number of the mesh at p, rounded. `line_hits`: the crossings of the line through p, t_m = 0 at
+  /// p; where the mesh is closed they tell it at once.
+  int winding(const Vec3d& p_m, const Vec3d& direction, const std::vector<RayTracer::Hit>& line_hits) const;
+  /// Negative inside [m].
+  double signed_distance(const Vec3d& p_m) const;
 };
 
 /// Traces the inward ray of every node of a rows x cols map through the whole mesh (paper 4.1.2 with the

@@ -188,7 +188,7 @@ ShellPoints sample_shell(const MeshQueries& queries, double half_width_m, std::u
   }
   tbb::parallel_for(0U, count, [&](std::uint32_t i) {
     // The truth of the point as rounded to float, which is what the runtime is asked.
-    shell.signed_distance_m[i] = queries.oracle.signed_distance(cast<double>(shell.points_m[i]));
+    shell.signed_distance_m[i] = queries.signed_distance(cast<double>(shell.points_m[i]));
   });
   return shell;
 }

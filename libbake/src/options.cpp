@@ -20,6 +20,7 @@ Outcome BakeOptions::check() const {
   if (!(max_error_percent > 0 && max_error_percent <= 100)) {
     return bad("max_error_percent", max_error_percent, "in (0, 100]");
   }
+  if (!(max_error_m >= 0 && max_error_m < 1e15)) return bad("max_error_m", max_error_m, "in [0, 1e15)");
   if (max_parts < 1 || max_parts > kMaxParts) return bad("max_parts", max_parts, "in [1, 4096]");
   if (max_bytes < 4096) return bad("max_bytes", static_cast<double>(max_bytes), ">= 4096");
   if (sample_count < 100 || sample_count > 10000000)
@@ -34,12 +35,27 @@ Outcome BakeOptions::check() const {
   return fit.check();
 }
 
+void BakeOptions::set(Quality quality) {
+  struct Limits {
+    double error_percent;
+    std::uint32_t parts;
+    std::uint64_t kilobytes;
+  };
+  const Limits limits = quality == Quality::kDraft  ? Limits{0.2, 12, 64}
+                        : quality == Quality::kFine ? Limits{0.025, 48, 256}
+                                                    : Limits{0.05, 24, 128};
+  max_error_percent = limits.error_percent;
+  max_error_m = 0;
+  max_parts = limits.parts;
+  max_bytes = limits.kilobytes * 1024;
+}
+
 // Each structure is taken apart by name, so that a new option that is not written here does not compile.
 std::string BakeOptions::to_json() const {
   static constexpr const char* kRepairNames[] = {"none", "safe", "all"};
   static constexpr const char* kAxisNames[] = {"x", "y", "z"};
-  const auto& [read_options, repair_options, decompose_options, fit_options, error_percent, parts, bytes,
-               samples, sample_seed] = *this;
+  const auto& [read_options, repair_options, decompose_options, fit_options, error_percent, error_m, parts,
+               bytes, samples, sample_seed] = *this;
   const auto& [metres_per_unit, up, size_limit] = read_options;  // the limit decides no byte
   const auto& [policy, weld_tolerance, max_hole_edges] = repair_options;
   const auto& [source_count, window, locale_width, boundary_strength, min_hull_gain, k_h, t_h,
@@ -47,6 +63,7 @@ std::string BakeOptions::to_json() const {
   const auto& [min_exponent, max_exponent, max_iterations, min_axis_ratio, quick] = fit_options;
   const nlohmann::json json = {
       {"max_error_percent", error_percent},
+      {"max_error_m", error_m},
       {"max_parts", parts},
       {"max_bytes", bytes},
       {"sample_count", samples},

@@ -84,6 +84,7 @@ class ExactRay {
 struct Query {
   RTCIntersectContext context;  // first: the callback is given its address
   const ExactRay* ray;
+  double first_t;  ///< crossings before it do not count
   std::vector<RayTracer::Hit>* hits;
 };
 
@@ -109,7 +110,8 @@ void intersect(const RTCIntersectFunctionNArguments* arguments) {
   const Triangle& triangle = static_cast<const Triangle*>(arguments->geometryUserPtr)[arguments->primID];
   const auto* query = reinterpret_cast<const Query*>(arguments->context);
   RayTracer::Hit hit{0, arguments->primID, false};
-  if (query->ray->crosses(triangle, hit.t_m, hit.entering) && hit.t_m >= 0) query->hits->push_back(hit);
+  if (query->ray->crosses(triangle, hit.t_m, hit.entering) && hit.t_m >= query->first_t)
+    query->hits->push_back(hit);
 }
 
 }  // namespace
@@ -164,6 +166,9 @@ struct RayTracer::Impl {
   }
   Vec3d unit(const Vec3d& p_m) const { return (1 / size_m) * (p_m - centre_m); }
 
+  /// All crossings with t >= first_t, which is 0 or -infinity.
+  void trace(const Vec3d& origin_m, const Vec3d& direction, double first_t, std::vector<Hit>& hits) const;
+
   bool touch(std::uint32_t f, std::uint32_t g) const {
     return std::ranges::any_of(faces[f],
                                [&](std::uint32_t v) { return std::ranges::count(faces[g], v) > 0; });
@@ -182,20 +187,22 @@ RayTracer::~RayTracer() = default;
 RayTracer::RayTracer(RayTracer&&) noexcept = default;
 RayTracer& RayTracer::operator=(RayTracer&&) noexcept = default;
 
-void RayTracer::trace(const Vec3d& origin_m, const Vec3d& direction, std::vector<Hit>& hits) const {
+void RayTracer::Impl::trace(const Vec3d& origin_m, const Vec3d& direction, double first_t,
+                            std::vector<Hit>& hits) const {
   hits.clear();
-  const Vec3d origin = impl_->unit(origin_m);
+  const Vec3d origin = unit(origin_m);
   if (!(std::abs(norm(direction) - 1) < 1e-3) || !std::isfinite(norm(origin))) return;  // NaN: no ray
 
-  // A ray from far away is started, for Embree, at the sphere round the unit box, where float is dense
-  // enough; and all a little early, so that boxes round t = 0 count.
+  // A line, or a ray from far away, is started, for Embree, at the sphere round the unit box, where float is
+  // dense enough; and all a little early, so that boxes round t = 0 count.
   constexpr double kSphere = 1;  // the corners of the box are at sqrt(3) / 2
-  const double start = std::max(0.0, -dot(origin, direction) - kSphere) - 4 * kBoxMargin;
+  const double start = std::max(first_t, -dot(origin, direction) - kSphere) - 4 * kBoxMargin;
   const Vec3f from = cast<float>(origin + start * direction), along = cast<float>(direction);
   const ExactRay ray(origin, direction);
   Query query{};
   rtcInitIntersectContext(&query.context);
   query.ray = &ray;
+  query.first_t = first_t;
   query.hits = &hits;
   RTCRayHit rayhit{};
   rayhit.ray = {from.x, from.y, from.z, 0, along.x, along.y, along.z, 0, 0, 0, 0, 0};
@@ -203,15 +210,15 @@ void RayTracer::trace(const Vec3d& origin_m, const Vec3d& direction, std::vector
   rayhit.ray.mask = 0xFFFFFFFF;
   rayhit.hit.geomID = RTC_INVALID_GEOMETRY_ID;
   rayhit.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
-  rtcIntersect1(impl_->scene, &query.context, &rayhit);
+  rtcIntersect1(scene, &query.context, &rayhit);
 
-  for (Hit& hit : hits) hit.t_m *= impl_->size_m;
+  for (Hit& hit : hits) hit.t_m *= size_m;
   std::ranges::sort(
       hits, [](const Hit& a, const Hit& b) { return a.t_m != b.t_m ? a.t_m < b.t_m : a.face < b.face; });
-  const double same_m = kSamePlace * impl_->size_m;
+  const double same_m = kSamePlace * size_m;
   for (std::size_t i = 0; i + 1 < hits.size();) {
     const Hit &a = hits[i], &b = hits[i + 1];
-    const bool grazes = b.t_m - a.t_m <= same_m && a.entering != b.entering && impl_->touch(a.face, b.face);
+    const bool grazes = b.t_m - a.t_m <= same_m && a.entering != b.entering && touch(a.face, b.face);
     if (!grazes) {
       ++i;
       continue;
@@ -220,6 +227,14 @@ void RayTracer::trace(const Vec3d& origin_m, const Vec3d& direction, std::vector
                hits.begin() + static_cast<std::ptrdiff_t>(i) + 2);
     if (i > 0) --i;
   }
+}
+
+void RayTracer::trace(const Vec3d& origin_m, const Vec3d& direction, std::vector<Hit>& hits) const {
+  impl_->trace(origin_m, direction, 0, hits);
+}
+
+void RayTracer::trace_line(const Vec3d& origin_m, const Vec3d& direction, std::vector<Hit>& hits) const {
+  impl_->trace(origin_m, direction, -std::numeric_limits<double>::infinity(), hits);
 }
 
 }  // namespace sqmap::bake

@@ -22,12 +22,37 @@ constexpr double kGone = 1e60;
 double area_x2(const std::array<Vec3d, 3>& t) { return norm(cross(t[1] - t[0], t[2] - t[0])); }
 Vec3d centroid(const std::array<Vec3d, 3>& t) { return (1.0 / 3) * (t[0] + t[1] + t[2]); }
 
-/// Solid angle of a triangle seen from the origin, positive when it is seen from behind (Van Oosterom and
-/// Strackee 1983). Zero, not NaN, when the origin is a corner.
-double solid_angle(const Vec3d& a, const Vec3d& b, const Vec3d& c) {
-  const double la = norm(a), lb = norm(b), lc = norm(c);
-  return 2 * std::atan2(dot(a, cross(b, c)), la * lb * lc + dot(a, b) * lc + dot(b, c) * la + dot(c, a) * lb);
-}
+/// Sums solid angles of triangles seen from the origin, positive when seen from behind (Van Oosterom and
+/// Strackee 1983). Half of each is the argument of a complex number; the numbers are multiplied, and the
+/// turns of the product counted, so that the sum takes one arc tangent. A triangle with a corner in the
+/// origin adds nothing.
+class SolidAngles {
+ public:
+  void add(const Vec3d& a, const Vec3d& b, const Vec3d& c) {
+    const double la = norm(a), lb = norm(b), lc = norm(c);
+    const double y = dot(a, cross(b, c));
+    const double x = la * lb * lc + dot(a, b) * lc + dot(b, c) * la + dot(c, a) * lb;
+    const double size = std::max(std::abs(x), std::abs(y));
+    if (!(size > 0)) return;
+    multiply(x / size, y / size);
+  }
+  double sum() const { return 2 * (std::atan2(y_, x_) + 2 * std::numbers::pi * turns_); }
+
+ private:
+  void multiply(double x, double y) {
+    // Arguments in [0, pi] and in (-pi, 0).
+    const bool up = y_ >= 0, other_up = y >= 0, both_back = x_ < 0 && x < 0;
+    const double product_x = x_ * x - y_ * y, product_y = x_ * y + y_ * x;
+    if (up && other_up && (both_back || (product_x < 0 && product_y < 0))) ++turns_;
+    if (!up && !other_up && (both_back || (product_x < 0 && product_y >= 0))) --turns_;
+    const double size = std::max(std::abs(product_x), std::abs(product_y));
+    x_ = product_x / size;
+    y_ = product_y / size;
+  }
+
+  double x_ = 1, y_ = 0;
+  int turns_ = 0;
+};
 
 /// Coefficients of the polynomial (n . r)(d . r) in r.
 void add_first(std::array<double, 6>& sum, const Vec3d& n, const Vec3d& d) {
@@ -161,6 +186,7 @@ double WindingTree::at(const Vec3d& p_m) const {
   const Vec3d q = per_m_ * (p_m - origin_m_);
   if (!std::isfinite(q.x + q.y + q.z)) return std::numeric_limits<double>::quiet_NaN();
   double steradians = 0;
+  SolidAngles near_by;
   std::array<std::uint32_t, 64> open{};  // halving 2^32 triangles goes 32 deep
   std::size_t open_count = 1;
   while (open_count > 0) {
@@ -173,13 +199,13 @@ double WindingTree::at(const Vec3d& p_m) const {
       steradians += expansion(r, d2, node.zeroth, node.first, node.second);
     } else if (node.right == 0) {
       for (std::uint32_t i = node.begin; i < node.end; ++i)
-        steradians += solid_angle(triangles_[i][0] - q, triangles_[i][1] - q, triangles_[i][2] - q);
+        near_by.add(triangles_[i][0] - q, triangles_[i][1] - q, triangles_[i][2] - q);
     } else {
       open[open_count++] = node.right;
       open[open_count++] = index + 1;
     }
   }
-  return steradians / (4 * std::numbers::pi);
+  return (steradians + near_by.sum()) / (4 * std::numbers::pi);
 }
 
 }  // namespace sqmap::bake

@@ -173,6 +173,7 @@ TEST(Bake, WritesDownEveryOptionThatDecidesTheBytes) {
   EXPECT_TRUE(changes([](BakeOptions& o) { o.read.up = UpAxis::kY; }));
   EXPECT_TRUE(changes([](BakeOptions& o) { o.repair.max_hole_edges = 7; }));
   EXPECT_TRUE(changes([](BakeOptions& o) { o.seed = 2; }));
+  EXPECT_TRUE(changes([](BakeOptions& o) { o.max_error_m = 0.1; }));
   EXPECT_FALSE(changes([](BakeOptions& o) { o.read.max_file_bytes = 1; }));
 }
 
@@ -183,6 +184,39 @@ TEST(Bake, NamesTheOptionItRefuses) {
   ASSERT_FALSE(result.ok());
   EXPECT_EQ(result.error().status, Status::kBadOption);
   EXPECT_NE(result.error().finding.find("max_error_percent = -1"), std::string::npos);
+}
+
+TEST(Bake, TakesTheTargetAsALengthToo) {
+  const SourceMesh torus = test::as_source(test::torus(1, 0.3, 48, 24));  // R_max 2.6 m
+  BakeOptions share = quick_options(), length = quick_options();
+  share.max_error_percent = 0.5;
+  length.max_error_m = 0.013;
+  auto by_share = bake(torus, share), by_length = bake(torus, length);
+  ASSERT_TRUE(by_share.ok() && by_length.ok());
+  const Asset &a = by_share.value().asset, &b = by_length.value().asset;
+  ASSERT_EQ(a.parts.size(), b.parts.size());
+  for (std::size_t k = 0; k < a.parts.size(); ++k) EXPECT_EQ(a.parts[k].map.code, b.parts[k].map.code);
+  auto usual = bake(torus, quick_options());
+  ASSERT_TRUE(usual.ok());
+  EXPECT_NE(usual.value().asset.parts[0].map.code, b.parts[0].map.code);
+}
+
+TEST(Bake, BetterQualityHasLessErrorAndMoreBytes) {
+  double last_percent = 100;
+  std::size_t last_texels = 0;
+  for (const Quality quality : {Quality::kDraft, Quality::kStandard, Quality::kFine}) {
+    BakeOptions options;
+    options.set(quality);
+    auto result = bake(test::as_source(test::torus(1, 0.3, 48, 24)), options);
+    ASSERT_TRUE(result.ok());
+    std::size_t texels = 0;
+    for (const Part& part : result.value().asset.parts) texels += part.map.code.size();
+    const double percent = finest(result.value().asset, 3).eq35_percent;
+    EXPECT_LT(percent, last_percent);
+    EXPECT_GT(texels, last_texels);
+    last_percent = percent;
+    last_texels = texels;
+  }
 }
 
 TEST(Bake, KeepsToTheByteBudgetAndSaysSo) {

@@ -2,6 +2,7 @@
 #include "map_builder.hpp"
 
 #include <cmath>
+#include <random>
 
 #include <gtest/gtest.h>
 
@@ -20,8 +21,9 @@ struct Scene {
   Mesh mesh;
   RayTracer rays;
   Oracle oracle;
-  explicit Scene(Mesh m) : mesh(std::move(m)), rays(mesh), oracle(mesh) {}
-  MeshQueries queries() const { return {mesh, rays, oracle, true}; }
+  OpenPlaces open;
+  explicit Scene(Mesh m) : mesh(std::move(m)), rays(mesh), oracle(mesh), open(mesh) {}
+  MeshQueries queries() const { return {mesh, rays, oracle, open}; }
 };
 
 Part part_around(const Superquadric& shape) {
@@ -107,14 +109,36 @@ TEST(Quantise, CoincidingCrossingsKeepTheParity) {
   EXPECT_EQ(later, 1);
 }
 
+TEST(MeshQueries, LinesTellTheSameInsideAsWindingNumbers) {
+  Mesh pierced = test::sphere(1, 4);  // one small hole, where 5 faces are missing
+  pierced.faces.resize(pierced.faces.size() - 5);
+  Mesh bowl = test::sphere(1, 3);
+  std::erase_if(bowl.faces, [&](const auto& f) { return bowl.vertices_m[f[0]].z > 0.2; });
+  for (const Mesh& mesh : {test::torus(1, 0.3, 64, 32), test::hollow_box({1, 1, 1}, 0.25), pierced, bowl}) {
+    const Scene scene(mesh);
+    const MeshQueries queries = scene.queries();
+    std::mt19937 random(5);
+    std::uniform_real_distribution<double> within(-1.4, 1.4);
+    int inside = 0;
+    for (int i = 0; i < 3000; ++i) {
+      const Vec3d p{within(random), within(random), within(random)};
+      EXPECT_EQ(queries.signed_distance(p) < 0, scene.oracle.inside(p));
+      inside += scene.oracle.inside(p);
+    }
+    EXPECT_GT(inside, 100);
+  }
+}
+
 constexpr std::uint64_t kNoLimit = std::uint64_t{1} << 40;
 
 TEST(MapParts, SpendTexelsOnlyWhereTheTargetAsksForThem) {
   const Scene scene(test::box({0.4, 0.5, 0.6}));
   std::vector<Part> parts{part_around({{0.9, 1.0, 1.1}, 0.7, 0.7})};
-  EXPECT_FALSE(map_parts(parts, {1.0}, scene.queries(), {1e-2, kNoLimit}));
+  const MeshQueries queries = scene.queries();
+  MapDrawer drawer(parts, {1.0}, queries);
+  EXPECT_FALSE(drawer.draw(parts, {1e-2, kNoLimit}));
   const auto coarse = parts[0].map.code.size();
-  EXPECT_FALSE(map_parts(parts, {1.0}, scene.queries(), {1e-3, kNoLimit}));
+  EXPECT_FALSE(drawer.draw(parts, {1e-3, kNoLimit}));
   EXPECT_GT(parts[0].map.code.size(), 2 * coarse);
   EXPECT_GE(parts[0].map.bits, 8U);
 }
@@ -123,14 +147,16 @@ TEST(MapParts, GiveTexelsToThePartWithTheLargerShareOfTheSurface) {
   const Scene scene(test::box({0.4, 0.5, 0.6}));
   const Part part = part_around({{0.9, 1.0, 1.1}, 0.7, 0.7});
   std::vector<Part> parts{part, part};
-  map_parts(parts, {1.0, 20.0}, scene.queries(), {2e-3, kNoLimit});
+  const MeshQueries queries = scene.queries();
+  MapDrawer(parts, {1.0, 20.0}, queries).draw(parts, {2e-3, kNoLimit});
   EXPECT_GT(parts[1].map.code.size(), 2 * parts[0].map.code.size());
 }
 
 TEST(MapParts, KeepToTheByteBudgetAndSaySo) {
   const Scene scene(test::box({0.4, 0.5, 0.6}));
   std::vector<Part> parts{part_around({{0.9, 1.0, 1.1}, 0.7, 0.7})};
-  EXPECT_TRUE(map_parts(parts, {1.0}, scene.queries(), {1e-4, 2000}));
+  const MeshQueries queries = scene.queries();
+  EXPECT_TRUE(MapDrawer(parts, {1.0}, queries).draw(parts, {1e-4, 2000}));
   EXPECT_LE(parts[0].map.code.size() * parts[0].map.bits / 8, 3000U);
 }
 

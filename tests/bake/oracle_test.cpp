@@ -228,6 +228,24 @@ TEST(RayTracer, CrossesATorusFourTimes) {
   EXPECT_TRUE(hits.empty());
 }
 
+TEST(RayTracer, ALineIsTheRayAndTheRayBackwards) {
+  const RayTracer tracer(test::torus(2, 0.5, 64, 32));
+  std::vector<RayTracer::Hit> line, ahead, behind;
+  const Vec3d origin{0.1, 0.2, 0.05}, direction = normalized(Vec3d{0.8, -0.5, 0.03});
+  tracer.trace_line(origin, direction, line);
+  tracer.trace(origin, direction, ahead);
+  tracer.trace(origin, -direction, behind);
+  ASSERT_EQ(ahead.size(), 2U);
+  ASSERT_EQ(behind.size(), 2U);
+  ASSERT_EQ(line.size(), 4U);
+  for (std::size_t k = 0; k < 2; ++k) {
+    EXPECT_NEAR(line[1 - k].t_m, -behind[k].t_m, 1e-12);
+    EXPECT_NE(line[1 - k].entering, behind[k].entering);
+    EXPECT_NEAR(line[2 + k].t_m, ahead[k].t_m, 1e-12);
+    EXPECT_EQ(line[2 + k].entering, ahead[k].entering);
+  }
+}
+
 TEST(RayTracer, CrossesAHollowBoxFourTimes) {
   const RayTracer tracer(test::hollow_box({1, 1, 1}, 0.25));
   std::vector<RayTracer::Hit> hits;

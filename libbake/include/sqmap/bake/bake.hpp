@@ -13,6 +13,13 @@
 
 namespace sqmap::bake {
 
+/// What a user names when he does not care for each limit.
+enum class Quality {
+  kDraft,     ///< target 0.2 %: to look at, or for far and small things
+  kStandard,  ///< target 0.05 %
+  kFine,      ///< target 0.025 %: about half the errors of kStandard
+};
+
 /// Everything that decides the bytes of a bundle. Written into it as JSON.
 struct BakeOptions {
   ReadOptions read;
@@ -20,6 +27,7 @@ struct BakeOptions {
   DecomposeOptions decompose;
   FitOptions fit;
   double max_error_percent = 0.05;  ///< target of eq. 35, percent of R_max, > 0
+  double max_error_m = 0;           ///< the target as a length; 0: max_error_percent holds
   std::uint32_t max_parts = 24;     ///< in [1, kMaxParts]
   std::uint64_t max_bytes =
       std::uint64_t{128} * 1024;       ///< of the stored maps, about; resolution gives way first
@@ -28,6 +36,8 @@ struct BakeOptions {
 
   Outcome check() const;
   std::string to_json() const;
+  /// Sets the error target and the limits on parts and bytes.
+  void set(Quality quality);
 };
 
 /// Wall time of one stage.

@@ -61,6 +61,8 @@ class RayTracer {
   /// grazes. `hits` is cleared first and stays empty for rays that are not finite or not of unit length
   /// within 1e-3.
   void trace(const Vec3d& origin_m, const Vec3d& direction, std::vector<Hit>& hits) const;
+  /// As trace, of the whole line: t_m < 0 behind the origin.
+  void trace_line(const Vec3d& origin_m, const Vec3d& direction, std::vector<Hit>& hits) const;
 
  private:
   struct Impl;
