@@ -8,10 +8,18 @@
 namespace sqmap::bench {
 namespace {
 
-Entrant sqmap_entrant(int layer, unsigned level) {
+/// The mean over the parts at this level.
+unsigned rows_of(const Asset& asset, unsigned level) {
+  std::size_t rows = 0;
+  for (const Part& part : asset.parts)
+    rows += ((part.map.rows - 1) >> std::min(level, part.map.level_count - 1)) + 1;
+  return static_cast<unsigned>(rows / std::max<std::size_t>(asset.parts.size(), 1));
+}
+
+Entrant sqmap_entrant(int layer, unsigned level, unsigned density = 0) {
   return {fmt::format("sqmap-layer{}{}", layer, level == 0 ? "" : fmt::format("-level{}", level)),
           fmt::format("sqmap-layer{}", layer),
-          [=](const Model& model) { return make_sqmap(model, layer, level); }};
+          [=](const Model& model) { return make_sqmap(model, layer, level); }, density};
 }
 
 Entrant grid_entrant(GridCode code, unsigned resolution) {
@@ -20,27 +28,42 @@ Entrant grid_entrant(GridCode code, unsigned resolution) {
                     : code == GridCode::kInt16SimdCulled ? "simd-culled"
                                                          : "simd";
   return {fmt::format("grid-{}-{}-{}", kind, resolution, how), fmt::format("grid-{}-{}", kind, how),
-          [=](const Model& model) { return make_grid(model, code, resolution); }};
+          [=](const Model& model) { return make_grid(model, code, resolution); }, resolution};
 }
 
 Entrant bricks_entrant(unsigned resolution) {
   return {fmt::format("bricks-8bit-{}-simd", resolution), "bricks-8bit-simd",
-          [=](const Model& model) { return make_bricks(model, resolution); }};
+          [=](const Model& model) { return make_bricks(model, resolution); }, resolution};
 }
 
-const Entrant kEmbree{"embree-closest", "embree-closest", make_embree};
-const Entrant kCgal{"cgal-closest", "cgal-closest", make_cgal};
+Entrant paper_entrant(unsigned rows, unsigned cols, unsigned subdivisions) {
+  const int layer = subdivisions == 0 ? 2 : 3;
+  return {fmt::format("paper-{}x{}-layer{}", rows, cols, layer), fmt::format("paper-layer{}", layer),
+          [=](const Model& model) { return make_paper(model, rows, cols, subdivisions); }, rows};
+}
+
+Entrant adf_entrant(unsigned resolution, double bound_percent) {
+  return {fmt::format("adf-float-{}-{}", resolution, bound_percent), fmt::format("adf-float-{}", resolution),
+          [=](const Model& model) { return make_adf(model, resolution, bound_percent); }, resolution};
+}
+
+const Entrant kEmbree{"embree-closest", "embree-closest", make_embree, 0};
+const Entrant kCgal{"cgal-closest", "cgal-closest", make_cgal, 0};
 
 }  // namespace
 
 std::vector<Entrant> frame_entrants(bool smoke) {
-  std::vector<Entrant> entrants{sqmap_entrant(2, 0), sqmap_entrant(3, 0)};
+  std::vector<Entrant> entrants{sqmap_entrant(1, 0), sqmap_entrant(2, 0), sqmap_entrant(3, 0)};
   for (const unsigned resolution : {64U, 128U, 256U})
     if (!smoke || resolution < 256) entrants.push_back(grid_entrant(GridCode::kInt16Simd, resolution));
   entrants.push_back(grid_entrant(GridCode::kInt16SimdCulled, 128));
   entrants.push_back(grid_entrant(GridCode::kFloatSimd, 128));
   entrants.push_back(grid_entrant(GridCode::kFloatScalar, 128));
   for (const unsigned resolution : {64U, 128U}) entrants.push_back(bricks_entrant(resolution));
+  entrants.push_back(adf_entrant(128, 0.1));
+  if (!smoke) entrants.push_back(adf_entrant(256, 0.05));
+  entrants.push_back(paper_entrant(100, 200, 0));
+  if (!smoke) entrants.push_back(paper_entrant(100, 200, 1));
   entrants.push_back(kEmbree);
   entrants.push_back(kCgal);
   return entrants;
@@ -51,7 +74,8 @@ std::vector<Entrant> accuracy_entrants(const Model& model, bool smoke) {
   std::uint32_t levels = 1;
   for (const Part& part : model.asset.parts) levels = std::max(levels, part.map.level_count);
   for (const int layer : {2, 3})
-    for (unsigned level = 0; level < levels; ++level) entrants.push_back(sqmap_entrant(layer, level));
+    for (unsigned level = 0; level < levels; ++level)
+      entrants.push_back(sqmap_entrant(layer, level, rows_of(model.asset, level)));
   for (const unsigned resolution : {16U, 32U, 64U, 128U, 256U}) {
     if (smoke && resolution > 128) continue;
     entrants.push_back(grid_entrant(GridCode::kFloatSimd, resolution));
@@ -60,6 +84,15 @@ std::vector<Entrant> accuracy_entrants(const Model& model, bool smoke) {
   }
   entrants.push_back(grid_entrant(GridCode::kInt16SimdCulled, 128));
   entrants.push_back(grid_entrant(GridCode::kFloatScalar, 128));
+  for (const double bound_percent : {0.8, 0.4, 0.2, 0.1, 0.05}) {
+    if (smoke && bound_percent > 0.4) continue;
+    entrants.push_back(adf_entrant(128, bound_percent));
+    if (!smoke) entrants.push_back(adf_entrant(256, bound_percent));
+  }
+  for (const unsigned rows : {25U, 50U, 100U, 200U})
+    if (!smoke || rows == 50 || rows == 100) entrants.push_back(paper_entrant(rows, 2 * rows, 0));
+  for (const unsigned rows : {25U, 50U, 100U})
+    if (!smoke || rows == 25) entrants.push_back(paper_entrant(rows, 2 * rows, 1));
   entrants.push_back(kEmbree);
   entrants.push_back(kCgal);
   return entrants;

@@ -8,6 +8,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <limits>
 #include <memory>
 #include <string>
 #include <vector>
@@ -35,14 +36,21 @@ class Peer {
   }
   virtual std::size_t bytes() const = 0;  ///< memory resident for queries
   virtual StatedError stated_error() const = 0;
+  /// Of the points that lie inside a superquadric, the share whose foot on it is more than kWrongFoot farther
+  /// away than the nearest. NaN: the method has no feet. Searches exhaustively: slow.
+  virtual double wrong_feet_percent(const Cloud&) const { return std::numeric_limits<double>::quiet_NaN(); }
   virtual double field_s() const { return 0; }  ///< time of the exact field it was made from, if any
 };
+
+inline constexpr double kWrongFoot = 0.005;      ///< of R_max
+inline constexpr std::size_t kFeetSample = 400;  ///< points of a cloud whose feet are looked at, about
 
 /// A method at one setting, by a name that reports keep.
 struct Entrant {
   std::string id;      ///< e.g. "grid-int16-128-simd"
   std::string family;  ///< methods that differ only in their setting, e.g. "grid-int16-simd"
   std::function<std::unique_ptr<Peer>(const Model&)> build;
+  unsigned density = 0;  ///< samples along an axis: nodes of a grid, rows of a map; 0: not its setting
 };
 
 /// A method that tells which triangles of the probe and the object cross.
@@ -52,19 +60,28 @@ class ContactPeer {
   virtual std::size_t contacts(const Placement& object_from_probe) const = 0;
   virtual std::size_t bytes() const = 0;  ///< of the object's side
 };
-std::unique_ptr<ContactPeer> make_fcl(const Model& model, const bake::Mesh& probe, bool first_contact_only);
+enum class FclTree { kObb, kKdop18 };
+std::unique_ptr<ContactPeer> make_fcl(const Model& model, const bake::Mesh& probe, FclTree tree,
+                                      bool first_contact_only);
+std::unique_ptr<ContactPeer> make_gimpact(const Model& model, const bake::Mesh& probe);
 /// The same number by testing every pair.
 std::size_t count_crossing_pairs(const Model& model, const bake::Mesh& probe,
                                  const Placement& object_from_probe);
 
 /// The method that ratios refer to: the strongest rival.
 inline constexpr const char* kReference = "grid-int16-128-simd";
+/// The method that the paper's Fig. 11 refers to.
+inline constexpr const char* kTreeReference = "fcl-obb-all-contacts";
 
 // One source a method.
 std::unique_ptr<Peer> make_sqmap(const Model& model, int layer, unsigned level);
 enum class GridCode { kFloatScalar, kFloatSimd, kInt16Simd, kInt16SimdCulled };
 std::unique_ptr<Peer> make_grid(const Model& model, GridCode code, unsigned resolution);
 std::unique_ptr<Peer> make_bricks(const Model& model, unsigned resolution);
+/// An octree over the lattice of the field at `resolution`, each leaf within `bound_percent` of R_max of it.
+std::unique_ptr<Peer> make_adf(const Model& model, unsigned resolution, double bound_percent);
+/// `rows` x `cols`: the paper's sampling density (eta_d, omega_d); `subdivisions`: its A_S, 0 is layer 2.
+std::unique_ptr<Peer> make_paper(const Model& model, unsigned rows, unsigned cols, unsigned subdivisions);
 std::unique_ptr<Peer> make_embree(const Model& model);
 std::unique_ptr<Peer> make_cgal(const Model& model);
 

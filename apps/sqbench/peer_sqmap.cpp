@@ -1,10 +1,16 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
 // Our own side, by the public interface alone.
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <numbers>
 #include <optional>
 #include <stdexcept>
 #include <vector>
 
+#include "sqmap/asset/superquadric.hpp"
 #include "sqmap/runtime/body.hpp"
 #include "sqmap/runtime/contact.hpp"
 #include "sqmap/runtime/object.hpp"
@@ -15,17 +21,66 @@
 namespace sqmap::bench {
 namespace {
 
+constexpr double kDirectionFrom = 0.001;  ///< of R_max
+
+/// From a point inside a superquadric along a direction to its surface, by bisection; part frame.
+double way_out_m(const Superquadric& shape, const Vec3d& m, const Vec3d& direction) {
+  double low_m = 0, high_m = 2 * bounding_radius_m(shape);
+  for (int i = 0; i < 60; ++i) {
+    const double middle_m = (low_m + high_m) / 2;
+    (inside_outside_radial(shape, m + middle_m * direction) < 1 ? low_m : high_m) = middle_m;
+  }
+  return high_m;
+}
+
+/// To the nearest point of a superquadric: the best of a lattice of angles, then ever smaller steps from
+/// there.
+double least_distance_m(const Superquadric& shape, const Vec3d& m) {
+  constexpr double pi = std::numbers::pi;
+  constexpr int kRows = 64;
+  const auto at = [](double angle, double e) {
+    return superellipse_point(std::cos(angle), std::sin(angle), e);
+  };
+  double best_m = std::numeric_limits<double>::infinity(), best_eta = 0, best_omega = 0;
+  const auto consider = [&](double eta, double omega, const auto& on_eta, const auto& on_omega) {
+    const double found_m = norm(surface_point(shape, on_eta, on_omega) - m);
+    if (!(found_m < best_m)) return false;
+    best_m = found_m, best_eta = eta, best_omega = omega;
+    return true;
+  };
+  std::array<SuperellipsePoint<double>, 2 * kRows> columns;
+  for (int c = 0; c < 2 * kRows; ++c)
+    columns[static_cast<std::size_t>(c)] = at(pi * c / kRows - pi, shape.e2);
+  for (int r = 0; r <= kRows; ++r) {
+    const double eta = pi * r / kRows - pi / 2;
+    const auto on_eta = at(eta, shape.e1);
+    for (int c = 0; c < 2 * kRows; ++c)
+      consider(eta, pi * c / kRows - pi, on_eta, columns[static_cast<std::size_t>(c)]);
+  }
+  for (double step = pi / kRows; step > 1e-6;) {
+    const double eta = best_eta, omega = best_omega;
+    bool is_better = false;
+    for (int k = 0; k < 9; ++k) {
+      const double near_eta = eta + (k / 3 - 1) * step, near_omega = omega + (k % 3 - 1) * step;
+      is_better |= consider(near_eta, near_omega, at(near_eta, shape.e1), at(near_omega, shape.e2));
+    }
+    if (!is_better) step /= 2;
+  }
+  return best_m;
+}
+
 class SqmapPeer : public Peer {
  public:
   SqmapPeer(const Model& model, int layer, unsigned level)
-      : object_(build(model.asset)), band_m_(static_cast<float>(kBand * model.r_max_m())) {
+      : model_(model), object_(build(model.asset)), band_m_(static_cast<float>(kBand * model.r_max_m())) {
     options_.layer = static_cast<runtime::Layer>(layer);
     options_.level = level;
     // The bundle records the mean over the points that lie inside a superquadric. 1.5: our sample is another
     // one.
     stated_percent_ = 100;
+    if (layer == 1) stated_percent_ = 100 * kBand;  // tells no distance: its hits stand for zero
     for (const ErrorRow& row : model.asset.errors)
-      if (row.level == level && row.layer == static_cast<std::uint32_t>(layer))
+      if (layer != 1 && row.level == level && row.layer == static_cast<std::uint32_t>(layer))
         stated_percent_ = 1.5 * row.depth_mean_percent + 1e-3;
   }
 
@@ -51,8 +106,34 @@ class SqmapPeer : public Peer {
     object_.query(points_m_, {.inside = inside}, options_);
     return true;
   }
+  double wrong_feet_percent(const Cloud& cloud) const override {
+    if (options_.layer != runtime::Layer::kTwo) return std::numeric_limits<double>::quiet_NaN();
+    std::size_t feet = 0, wrong = 0;
+    const std::size_t step = std::max<std::size_t>(cloud.count / kFeetSample, 1);
+    for (std::size_t i = 0; i < cloud.count; i += step) {
+      const runtime::Answer answer = object_.query(cloud.points_m[i], options_);
+      // Closer to the surface the direction to it is decided by rounding.
+      if (answer.part == runtime::kNowhere ||
+          !(std::abs(answer.signed_distance_m) > kDirectionFrom * model_.r_max_m()))
+        continue;
+      // In layer 2 point, surface and foot lie on one normal of the superquadric.
+      const Part& part = model_.asset.parts[answer.part];
+      const auto turn = rotation(part.object_from_part.orientation);
+      const Vec3d p_m = cast<double>(cloud.points_m[i]);
+      const Vec3d m = turn.apply_inverse(p_m - part.object_from_part.translation_m);
+      const double side = answer.signed_distance_m < 0 ? -1 : 1;
+      const Vec3d outward = turn.apply_inverse(side * normalized(p_m - cast<double>(answer.surface_m)));
+      ++feet;
+      if (way_out_m(part.shape, m, outward) - least_distance_m(part.shape, m) > kWrongFoot * model_.r_max_m())
+        ++wrong;
+    }
+    return feet == 0 ? std::numeric_limits<double>::quiet_NaN()
+                     : 100 * static_cast<double>(wrong) / static_cast<double>(feet);
+  }
   std::size_t bytes() const override { return object_.resident_bytes(); }
-  StatedError stated_error() const override { return {stated_percent_, true}; }
+  StatedError stated_error() const override {
+    return {stated_percent_, options_.layer != runtime::Layer::kOne};
+  }
 
  private:
   /// First, middle or last point.
@@ -77,6 +158,7 @@ class SqmapPeer : public Peer {
     return std::move(object).value();
   }
 
+  const Model& model_;
   runtime::Object object_;
   runtime::QueryOptions options_;
   float band_m_;

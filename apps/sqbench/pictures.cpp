@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
 
 #include <fmt/format.h>
 
+#include "peer.hpp"
 #include "results.hpp"
 #include "svg.hpp"
 
@@ -104,6 +106,57 @@ void add_frames(const Results& results, std::vector<Picture>& pictures) {
   }
 }
 
+/// Fig. 11 of the paper: ours as a share of the OBB tree, all contacts.
+void add_shares_of_tree(const Results& results, std::vector<Picture>& pictures) {
+  for (const char* work : {"touching", "grasp"}) {
+    std::vector<std::pair<std::string, double>> values;
+    for (const ModelRow& model : results.models) {
+      const auto us_of = [&](const std::string& peer) {
+        const auto it = std::find_if(results.frames.begin(), results.frames.end(), [&](const FrameRow& row) {
+          return row.model == model.model && row.work == work && row.peer == peer;
+        });
+        return it == results.frames.end() ? std::numeric_limits<double>::quiet_NaN() : it->us.median;
+      };
+      const double tree_us = us_of(kTreeReference);
+      for (const char* peer :
+           {"sqmap-layer1", "sqmap-layer2", "sqmap-layer3", "fcl-obb-first-contact",
+            "fcl-kdop18-all-contacts", "fcl-kdop18-first-contact", "bullet-gimpact-all-contacts"})
+        values.emplace_back(peer, 100 * us_of(peer) / tree_us);
+    }
+    const std::vector<Bar> bars = bars_over_models(values);
+    if (bars.empty()) continue;
+    const std::string title =
+        fmt::format("Fig. 11 of the paper, {}: cost of a frame, OBB tree with all contacts = 100 %", work);
+    pictures.push_back(
+        {fmt::format("fig11-{}", work), title,
+         bars_svg(title, "% of the OBB tree; line: from the least model to the greatest", bars)});
+  }
+}
+
+/// Fig. 12 of the paper: memory against sampling density, of the first model and of all.
+void add_memory_by_density(const Results& results, std::vector<Picture>& pictures) {
+  if (results.models.empty()) return;
+  for (const std::string& model : {results.models.front().model, std::string("all models")}) {
+    SeriesByFamily series;
+    for (const MemoryRow& row : results.memory) {
+      const bool is_shown = row.family == "grid-float-simd" || row.family == "paper-layer2" ||
+                            row.family == "sqmap-layer3" || row.family.starts_with("adf-float");
+      if (row.model != model || !is_shown) continue;
+      // One line for the octree at each bound, over the resolutions of its lattice.
+      const std::string family = row.family.starts_with("adf-float")
+                                     ? "ADF, bound " + row.method.substr(row.method.rfind('-') + 1) + " %"
+                                     : row.family;
+      series.add(family, {static_cast<double>(row.density), row.bytes / 1e3, row.bytes,
+                          fmt::format("{}: {:.4g} KB", row.method, row.bytes / 1e3)});
+    }
+    if (series.series.empty()) continue;
+    const std::string title = fmt::format("Fig. 12 of the paper, {}: memory and sampling density", model);
+    pictures.push_back({model == "all models" ? "fig12-all" : "fig12-first", title,
+                        scatter_svg(title, "samples along an axis: nodes of a grid, rows of a map",
+                                    "KB resident", series.series)});
+  }
+}
+
 void add_rest(const Results& results, std::vector<Picture>& pictures) {
   std::vector<std::pair<std::string, double>> memory, jumps, effects;
   for (const MemoryRow& row : results.memory)
@@ -137,6 +190,8 @@ std::vector<Picture> pictures(const Results& results) {
   std::vector<Picture> all;
   add_frames(results, all);
   add_accuracy(results, all);
+  add_shares_of_tree(results, all);
+  add_memory_by_density(results, all);
   add_rest(results, all);
   return all;
 }

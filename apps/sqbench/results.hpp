@@ -57,13 +57,16 @@ struct AccuracyRow {
   double mean_error_percent{}, p95_error_percent{},
       max_error_percent{};      ///< of the answered points, of R_max
   double wrong_side_percent{};  ///< no answer at all means outside
+  double wrong_feet_percent{};  ///< of the feet on superquadrics; NaN: has none
   double normal_mean_deg{};     ///< angle to the true gradient, |distance| > 0.1 % of R_max
   Spread ns;                    ///< a point
 };
 struct MemoryRow {
   std::string model, method;  ///< method: "DF", "ADF" or "SQ", as in the paper's Table 1, or a peer of ours
   double bytes{};
-  bool is_paper{};  ///< printed in the paper, for its own model of that name
+  bool is_paper{};     ///< printed in the paper, for its own model of that name
+  std::string family;  ///< methods that differ only in their setting; empty: the bundle, or of the paper
+  unsigned density{};  ///< samples along an axis: nodes of a grid, rows of a map; 0: not its setting
 };
 struct BakeRow {
   std::string model, method;

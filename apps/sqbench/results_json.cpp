@@ -64,11 +64,13 @@ Json to_json(const AccuracyRow& r) {
           {"p95_error_percent", r.p95_error_percent},
           {"max_error_percent", r.max_error_percent},
           {"wrong_side_percent", r.wrong_side_percent},
+          {"wrong_feet_percent", r.wrong_feet_percent},
           {"normal_mean_deg", r.normal_mean_deg},
           {"ns", to_json(r.ns)}};
 }
 Json to_json(const MemoryRow& r) {
-  return {{"model", r.model}, {"method", r.method}, {"bytes", r.bytes}, {"is_paper", r.is_paper}};
+  return {{"model", r.model},       {"method", r.method}, {"bytes", r.bytes},
+          {"is_paper", r.is_paper}, {"family", r.family}, {"density", r.density}};
 }
 Json to_json(const BakeRow& r) {
   return {{"model", r.model},     {"method", r.method}, {"target_percent", r.target_percent},

@@ -66,6 +66,7 @@ AccuracyRow compare(const Model& model, const BuiltPeer& built, const Shell& she
   row.p95_error_percent = errors.empty() ? kNan : errors[errors.size() * 95 / 100];
   row.max_error_percent = errors.empty() ? kNan : errors.back();
   row.wrong_side_percent = share(wrong, count);
+  row.wrong_feet_percent = built.peer->wrong_feet_percent(cloud);
   row.normal_mean_deg =
       angles == 0 ? kNan : angle_sum_rad / static_cast<double>(angles) * 180 / std::numbers::pi;
   return row;

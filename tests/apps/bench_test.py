@@ -6,6 +6,7 @@ import csv
 import json
 import os
 import re
+import shutil
 import subprocess
 import sys
 import unittest
@@ -16,6 +17,31 @@ from support import ROUGH, FolderTest, box, run, sphere, write_off
 
 ROOT = Path(os.environ["SQMAP_SOURCE_DIR"])
 SCHEMA = ROOT / "apps" / "sqbench" / "results.schema.json"
+CHROMIUM = shutil.which("chromium")
+# Draws each picture of the page and counts its pixels that are not of the commonest colour, by colour.
+PAINT = """
+<pre id="painted"></pre><script>
+const figures = [...document.querySelectorAll("figure svg")];
+Promise.all(figures.map(svg => new Promise((done, failed) => {
+  const image = new Image();
+  image.onerror = failed;
+  image.onload = () => {
+    const canvas = document.createElement("canvas");
+    canvas.width = 480; canvas.height = 320;
+    const pen = canvas.getContext("2d");
+    pen.drawImage(image, 0, 0, 480, 320);
+    const pixels = pen.getImageData(0, 0, 480, 320).data, count = new Map();
+    for (let i = 0; i < pixels.length; i += 4) {
+      const colour = pixels.slice(i, i + 4).join();
+      count.set(colour, (count.get(colour) || 0) + 1);
+    }
+    const counts = [...count.values()].sort((a, b) => b - a);
+    done({colours: counts.length, drawn: counts.slice(1).reduce((a, b) => a + b, 0)});
+  };
+  image.src = "data:image/svg+xml;charset=utf-8," +
+              encodeURIComponent(new XMLSerializer().serializeToString(svg));
+}))).then(all => { document.getElementById("painted").textContent = JSON.stringify(all); });
+</script>"""
 COMPARE = ROOT / "scripts" / "bench_compare"
 TYPES = {"object": dict, "array": list, "string": str, "boolean": bool, "null": type(None)}
 
@@ -98,11 +124,12 @@ class Smoke(FolderTest):
         self.assertTrue(all(check["holds"] for check in self.results["checks"]))
         checked = {check["peer"] for check in self.results["checks"]}
         self.assertLessEqual({row["peer"] for row in self.results["accuracy"]}, checked)
-        self.assertIn("fcl-obb-all-contacts", checked)
+        self.assertLessEqual({"fcl-obb-all-contacts", "fcl-kdop18-all-contacts", "fcl-kdop18-first-contact",
+                              "bullet-gimpact-all-contacts"}, checked)
 
     def test_grids_answer_every_point_of_the_shells(self):
         for row in self.rows("accuracy"):
-            if "128" in row["peer"]:
+            if "128" in row["peer"] and not row["peer"].startswith("adf"):
                 self.assertGreater(row["answered_inside_percent"], 99.9, row)
                 self.assertGreater(row["answered_outside_percent"], 98, row)
 
@@ -117,6 +144,45 @@ class Smoke(FolderTest):
                 self.assertLess(row["max_error_percent"], 1e-4)
                 self.assertEqual(row["wrong_side_percent"], 0)
                 self.assertLess(row["normal_mean_deg"], 0.5)
+
+    def test_octree_of_a_smaller_bound_is_larger_and_closer_to_the_grid_it_was_made_from(self):
+        for model in ("ball", "brick"):
+            rows = [self.rows("accuracy", model=model, shell_percent=3.0, peer=f"adf-float-128-{bound}")[0]
+                    for bound in (0.4, 0.05)]
+            sizes = [self.rows("peers", model=model, peer=row["peer"])[0]["bytes"] for row in rows]
+            grid = self.rows("accuracy", model=model, shell_percent=3.0, peer="grid-float-128-simd")[0]
+            self.assertLess(sizes[0], sizes[1])
+            self.assertLess(rows[1]["mean_error_percent"], rows[0]["mean_error_percent"])
+            for row, bound in zip(rows, (0.4, 0.05)):
+                self.assertLess(row["mean_error_percent"] - grid["mean_error_percent"], bound)
+                self.assertGreater(row["answered_inside_percent"], 99.9)
+                # Points within the bound of the rim of the band may be told to lie beyond it.
+                self.assertGreater(row["answered_outside_percent"], 98 - 100 * bound / 3)
+        self.assertLess(sizes[0], 0.25 * self.rows("peers", model="brick", peer="grid-float-128-simd")[0]["bytes"])
+
+    def test_feet_are_right_on_a_sphere_and_in_a_box_few_are_wrong_but_more_of_the_papers_search(self):
+        for row in self.rows("accuracy", peer="sqmap-layer2"):
+            self.assertLessEqual(row["wrong_feet_percent"], {"ball": 0, "brick": 2}[row["model"]])
+        ours, paper = (self.rows("accuracy", model="brick", peer=peer, shell_percent=3.0)[0]["wrong_feet_percent"]
+                       for peer in ("sqmap-layer2", "paper-100x200-layer2"))
+        self.assertGreater(paper, 2 * ours)
+        coarse, fine = (self.rows("accuracy", model="ball", peer=f"paper-{n}x{2 * n}-layer2", shell_percent=3.0)[0]
+                        for n in (50, 100))
+        self.assertLess(fine["wrong_feet_percent"], 2)
+        # The printed query measures to nodes, 1.6 % of R_max apart at the most.
+        self.assertLess(fine["mean_error_percent"], 0.4)
+        self.assertGreater(coarse["mean_error_percent"], fine["mean_error_percent"])
+        for row in self.rows("accuracy", peer="embree-closest"):
+            self.assertIsNone(row["wrong_feet_percent"])
+
+    def test_first_contact_ends_a_frame_with_one(self):
+        for tree in ("obb", "kdop18"):
+            for work, expected in (("touching", 1), ("far", 0)):
+                for row in self.rows("frames", peer=f"fcl-{tree}-first-contact", work=work):
+                    self.assertEqual(row["answers_mean"], expected, row)
+        for row in self.rows("frames", peer="fcl-obb-all-contacts"):
+            twin = self.rows("frames", peer="fcl-kdop18-all-contacts", model=row["model"], work=row["work"])[0]
+            self.assertAlmostEqual(twin["answers_mean"], row["answers_mean"], delta=0.02 * row["answers_mean"])
 
     def test_scalar_vector_and_culled_grids_give_the_same_answers(self):
         for row in self.rows("frames", peer="grid-int16-128-simd"):
@@ -134,7 +200,8 @@ class Smoke(FolderTest):
                 if row["work"] == "far":
                     self.assertEqual(row["near_mean"], 0)
         for row in self.rows("frames", work="far"):
-            self.assertEqual(row["answers_mean"], 0, row)
+            if row["peer"] != "sqmap-layer1":  # all it knows are superquadrics
+                self.assertEqual(row["answers_mean"], 0, row)
         for row in self.rows("frames", peer="embree-closest"):
             work = self.rows("works", model=row["model"], work=row["work"])[0]
             self.assertAlmostEqual(row["answers_mean"], work["near_mean"], delta=0.5)
@@ -152,11 +219,16 @@ class Smoke(FolderTest):
         self.assertAlmostEqual(peer["grid-int16-128-simd"]["bytes"], 2 * nodes, delta=1000)
         self.assertLess(peer["bricks-8bit-128-simd"]["bytes"], nodes)
         elephant = {row["method"]: row["bytes"] for row in self.rows("memory", model="Elephant", is_paper=True)}
+        # The paper's maps: a float a node, and what a row and a column share.
+        coarse, fine = (peer[f"paper-{n}x{2 * n}-layer2"]["bytes"] for n in (50, 100))
+        self.assertAlmostEqual(fine / coarse, 4, delta=0.5)
         self.assertEqual(elephant, {"DF": 417e6, "ADF": 68e6, "SQ": 5.1e6})
 
     def test_every_picture_draws_its_values_and_stands_on_the_page(self):
         pictures = {name: text for name, text in self.files.items() if name.endswith(".svg")}
-        self.assertGreaterEqual(len(pictures), 11)
+        self.assertGreaterEqual(len(pictures), 15)
+        self.assertLessEqual({"fig11-touching.svg", "fig11-grasp.svg", "fig12-first.svg", "fig12-all.svg"},
+                             pictures.keys())
         for name, text in pictures.items():
             with self.subTest(name=name):
                 ET.fromstring(text)
@@ -170,7 +242,35 @@ class Smoke(FolderTest):
         page = self.files["index.html"]
         self.assertNotRegex(page, r"<script|src=|href=\"(?!data:)")
         self.assertIn("Near contact (+-0.5 % shell)", page)
+        for words in ("The paper's query as printed", "Fig. 11, touching: layers 1, 2 and 3 cost",
+                      "Table 1, all models"):
+            self.assertIn(words, page)
         self.assertRegex(page, r"(wins against|loses to) that grid")
+
+    @unittest.skipUnless(CHROMIUM, "no Chromium here")
+    def test_chromium_shows_the_page_without_an_error_and_every_figure_with_something_on_it(self):
+        def dom_of(page, name):
+            path = self.folder / name
+            path.write_text(page, encoding="utf-8")
+            done = subprocess.run(
+                [CHROMIUM, "--headless", "--no-sandbox", "--disable-gpu", f"--user-data-dir={self.folder}/profile",
+                 "--enable-logging=stderr", "--virtual-time-budget=20000", "--dump-dom", path.as_uri()],
+                capture_output=True, text=True, timeout=120, check=True)
+            return done.stdout, [line for line in done.stderr.splitlines() if "CONSOLE" in line]
+
+        page = self.files["index.html"]
+        self.assertEqual(dom_of(page, "page.html")[1], [])
+        # What the check would see of an error, and of a blank figure.
+        self.assertEqual(len(dom_of("<script>console.error('no')</script>", "broken.html")[1]), 1)
+        blank = '<figure><svg xmlns="http://www.w3.org/2000/svg" width="10" height="10"></svg></figure>'
+        dom, errors = dom_of(page.replace("</body>", blank + PAINT + "</body>"), "painted.html")
+        self.assertEqual(errors, [])
+        painted = json.loads(re.search(r'<pre id="painted">(.*?)</pre>', dom).group(1))
+        self.assertEqual(len(painted), page.count("<figure>") + 1)
+        self.assertEqual(painted.pop()["drawn"], 0)
+        for figure in painted:
+            self.assertGreater(figure["drawn"], 500)
+            self.assertGreater(figure["colours"], 3)
 
     def test_csv_holds_the_numbers_of_the_json(self):
         table = list(csv.DictReader(self.files["results.csv"].splitlines()))
