@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <exception>
 #include <map>
+#include <memory>
 #include <new>
 #include <string>
 #include <string_view>
@@ -22,6 +23,17 @@ namespace {
 
 const std::map<std::string, When> kWhenNames{
     {"auto", When::kAuto}, {"always", When::kAlways}, {"never", When::kNever}};
+
+/// CLI11 shows --no-cache, a flag that means false, as --no-cache{false}.
+class HelpFormatter : public CLI::Formatter {
+ public:
+  std::string make_option_name(const CLI::Option* option, bool is_positional) const override {
+    constexpr std::string_view kMark = "{false}";
+    std::string name = CLI::Formatter::make_option_name(option, is_positional);
+    if (const std::size_t at = name.find(kMark); at != std::string::npos) name.erase(at, kMark.size());
+    return name;
+  }
+};
 
 std::string command_names(const Program& program) {
   std::string names;
@@ -53,7 +65,8 @@ std::string suggestion(const CLI::App& app, int argc, char** argv) {
     const std::string_view word(argv[k]);
     const std::string name(word.substr(0, word.find('=')));
     if (name == "--") break;
-    if (name.starts_with("--") && std::ranges::find(names, name) == names.end()) return did_you_mean(name, names);
+    if (name.starts_with("--") && std::ranges::find(names, name) == names.end())
+      return did_you_mean(name, names);
   }
   return "";
 }
@@ -82,6 +95,7 @@ Exit parse_and_run(const Program& program, Console& console, int argc, char** ar
                                                 kFormatMajor, kFormatMinor));
   app.require_subcommand(1);
   app.footer(exit_code_table());
+  app.formatter(std::make_shared<HelpFormatter>());
   app.get_formatter()->column_width(34);
 
   When color = When::kAuto;
@@ -117,7 +131,7 @@ Exit parse_and_run(const Program& program, Console& console, int argc, char** ar
     const bool is_extra = problem.get_exit_code() == static_cast<int>(CLI::ExitCodes::ExtrasError);
     std::string names;
     for (const CLI::App* at = &deepest(app); at != nullptr; at = at->get_parent())
-      names = at->get_name() + (names.empty() ? "" : " " + names);
+      names.insert(0, at->get_name() + (names.empty() ? "" : " "));
     console.error(fmt::format("{}{}; see `{} --help`", one_line(problem.what()),
                               is_extra ? suggestion(app, argc, argv) : "", names));
     return Exit::kUsage;

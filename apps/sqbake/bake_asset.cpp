@@ -27,26 +27,15 @@ double seconds_since(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
 }
 
-/// The bake's options for one mesh: a target given as a length becomes a share of R_max.
-bake::BakeOptions options_for(const AssetOptions& asked, const bake::SourceMesh& source) {
-  bake::BakeOptions options = asked.bake;
-  // R_max is known only after repair; the diagonal is never shorter, so the target is never looser than
-  // asked.
-  if (asked.max_error && asked.max_error->length_m > 0)
-    options.max_error_percent = std::min(100.0, 100 * asked.max_error->length_m / diagonal_m(source.mesh));
-  return options;
-}
-
 // Error target of the fallback, in percent of R_max: coarse, so that it costs little.
 constexpr double kFallbackError_percent = 2;
 
-/// As plain as libbake gets: components are not cut, the maps are coarse.
+/// As plain as libbake gets: one superquadric for the whole mesh, a coarse map.
 bake::BakeOptions fallback_options(bake::BakeOptions options) {
   options.max_error_percent = std::max(options.max_error_percent, kFallbackError_percent);
+  options.max_error_m = 0;
   options.max_parts = 1;
-  options.decompose.source_count = 1;
-  options.decompose.use_boundary_strength = false;
-  options.decompose.use_hyperbolic = false;
+  options.decompose.join_components = true;
   options.fit.quick = true;
   options.sample_count = std::min(options.sample_count, std::uint32_t{2000});
   return options;
@@ -84,8 +73,7 @@ std::optional<Error> bake_into(BakeProduct& product, const BakeJob& job, const A
   record.times.push_back({"read", seconds_since(read_start)});
   if (const auto warning = size_warning(source.value().mesh)) record.warnings.push_back(*warning);
 
-  bake::BakeOptions options = options_for(asked, source.value());
-  if (job.is_fallback) options = fallback_options(options);
+  const bake::BakeOptions options = job.is_fallback ? fallback_options(asked.bake) : asked.bake;
   Result<bake::BakeResult> result = bake::bake(source.value(), options, progress);
   if (!result) return result.error();
   Asset& asset = result.value().asset;

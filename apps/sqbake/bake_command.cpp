@@ -1,23 +1,56 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include <filesystem>
 #include <map>
 #include <memory>
 #include <string>
+#include <string_view>
+#include <system_error>
 #include <utility>
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
+#include "../common/files.hpp"
 #include "bake_run.hpp"
 #include "commands.hpp"
 #include "depfile.hpp"
 #include "dry_run.hpp"
 #include "job_list.hpp"
 #include "plan/shard_jobs.hpp"
+#include "report/report_page.hpp"
 #include "settings.hpp"
 #include "stop_signals.hpp"
 
 namespace sqmap::apps {
 namespace {
+
+/// A report takes the place of whatever file has its name, so it must look like one.
+Outcome check_report(const std::filesystem::path& file) {
+  if (file.empty()) return Done{};
+  if (file.extension() != ".html")
+    return Error{Status::kBadOption, fmt::format("--report {}: a report's name ends in .html", file.string()),
+                 "choose a name that ends in .html"};
+  std::error_code code;
+  const std::filesystem::path folder = file.has_parent_path() ? file.parent_path() : ".";
+  if (!std::filesystem::is_directory(folder, code))
+    return Error{Status::kFileUnwritable,
+                 fmt::format("--report {}: no folder {}", file.string(), folder.string()),
+                 "make the folder, or name another file"};
+  return Done{};
+}
+
+Outcome write_run_report(const BakeArguments& arguments, std::string_view record_lines) {
+  const Result<AssetRecords> records = parse_asset_records(record_lines, "records");
+  if (!records) return records.error();
+  const JobRequest& request = arguments.request;
+  ReportOptions options;
+  options.title =
+      "sqbake bake " + (request.inputs.empty() ? request.manifest.string() : request.inputs.front());
+  const std::string page = report_page(records.value().records, options);
+  const WriteGuard guard;
+  if (stop_signal() != 0) return Done{};
+  return write_file(arguments.report, page);
+}
 
 Exit run_bake(Console& console, const BakeArguments& arguments) {
   const auto refuse = [&](const Error& error) {
@@ -37,10 +70,20 @@ Exit run_bake(Console& console, const BakeArguments& arguments) {
     print_plan(console, list.value(), arguments.format);
     return Exit::kOk;
   }
+  if (const Outcome ok = check_report(arguments.report); !ok) return refuse(ok.error());
   if (const Outcome ok = prepare_folders(list.value(), arguments.request); !ok) return refuse(ok.error());
   install_stop_signals();
   const std::vector<Job> jobs = arguments.depfile.empty() ? std::vector<Job>() : list.value().jobs;
-  const Exit code = BakeRun(console, arguments, std::move(list).value()).run();
+  BakeRun bake_run(console, arguments, std::move(list).value());
+  const Exit code = bake_run.run();
+  if (!arguments.report.empty() && stop_signal() == 0) {
+    const Outcome ok = write_run_report(arguments, bake_run.record_lines());
+    if (stop_signal() != 0) return static_cast<Exit>(128 + stop_signal());
+    if (!ok) {
+      const Exit refused = refuse(ok.error());
+      if (code == Exit::kOk) return refused;
+    }
+  }
   if (code == Exit::kOk && !arguments.depfile.empty())
     if (const Outcome ok = write_depfile(arguments.depfile, jobs); !ok) return refuse(ok.error());
   return code;
@@ -58,7 +101,7 @@ constexpr const char* kDescription =
     "Examples:\n"
     "  sqbake bake hand.off -o hand.h5\n"
     "  sqbake bake hand.stl -o hand.h5 --unit mm --up y --max-error 0.2mm\n"
-    "  sqbake bake models/ --recursive --out-dir bundles/ --max-bytes 64K -j 8\n"
+    "  sqbake bake models/ --recursive --out-dir bundles/ --quality draft -j 8\n"
     "  sqbake bake 'models/**/*.obj' --out-dir bundles/ --timeout 2m --memory 4G --fallback superquadric\n"
     "  sqbake bake --manifest props.toml --out-dir bundles/ --format ndjson\n"
     "\n"
@@ -102,6 +145,8 @@ void add_run_options(CLI::App& app, BakeArguments& arguments) {
       ->type_name("DIR");
   app.add_flag("!--no-cache", arguments.use_cache, "Bake all; neither read nor fill the cache");
   app.add_flag("--explain", arguments.explain, "Say why each mesh is baked, or is not");
+  app.add_option("--report", arguments.report, "Write a page of the run, as `sqbake report` makes it")
+      ->type_name("FILE.html");
   app.add_option("--depfile", arguments.depfile, "Write the files read, as a rule for make and ninja")
       ->type_name("FILE");
 }

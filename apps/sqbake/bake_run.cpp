@@ -8,7 +8,6 @@
 #include <utility>
 
 #include <fmt/format.h>
-#include <nlohmann/json.hpp>
 
 #include "sqmap/bake/version.hpp"
 
@@ -46,10 +45,7 @@ RecordWriter::Options writer_options(const BakeArguments& arguments, const JobLi
 /// not kept.
 BakeIdentity identity_of(const Job& job) {
   const AssetOptions options = options_from(texts_of(job.settings)).value();  // checked when it was listed
-  nlohmann::json json = nlohmann::json::parse(options.bake.to_json());
-  if (options.max_error && options.max_error->length_m > 0)
-    json["max_error_length_m"] = options.max_error->length_m;
-  return {json.dump(), bake::algorithm_version()};
+  return {options.bake.to_json(), bake::algorithm_version()};
 }
 
 std::optional<BundleCache> open_cache(const BakeArguments& arguments) {
@@ -201,7 +197,7 @@ void BakeRun::on_finished(std::size_t index, BakeProduct product) {
       record.verdict = Verdict::kDegraded;
       record.degradations.insert(
           record.degradations.begin(),
-          {"fallback", fmt::format("one superquadric a component at most ({}: {})",
+          {"fallback", fmt::format("one superquadric for the whole mesh ({}: {})",
                                    verdict_name(cause->verdict), cause->error->finding)});
     } else if (record.verdict != Verdict::kCancelled) {
       record.warnings.push_back(
@@ -251,6 +247,7 @@ void BakeRun::hand_in(std::size_t index, BakeRecord record) {
 }
 
 void BakeRun::report(BakeRecord& record, const Job& job) {
+  if (!arguments_.report.empty()) record_lines_ += record_line(record);
   for (const std::string& warning : record.warnings) console_.warning(job.name + ": " + warning);
   for (const Degradation& item : record.degradations)
     console_.warning(fmt::format("{}: degraded: {}", job.name, item.finding));

@@ -5,6 +5,7 @@
 #include <deque>
 #include <filesystem>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "../common/console.hpp"
@@ -31,8 +32,9 @@ struct BakeArguments {
   bool verify_determinism = false;
   bool no_isolation = false;
   std::filesystem::path depfile;
-  std::string shard;            ///< as parse_shard() takes it; empty: bake all
-  std::filesystem::path cache;  ///< folder of the cache; empty: the default one
+  std::filesystem::path report;  ///< HTML page to write; empty: none
+  std::string shard;             ///< as parse_shard() takes it; empty: bake all
+  std::filesystem::path cache;   ///< folder of the cache; empty: the default one
   bool use_cache = true;
   bool explain = false;  ///< say why each mesh is baked, or is not
 };
@@ -44,6 +46,8 @@ class BakeRun {
   BakeRun(Console& console, const BakeArguments& arguments, JobList list);
 
   Exit run();
+  /// The records of the finished run, as NDJSON; empty unless a report was asked for.
+  const std::string& record_lines() const noexcept { return record_lines_; }
 
  private:
   struct Attempt {
@@ -88,6 +92,7 @@ class BakeRun {
   std::vector<std::optional<BakeRecord>> records_;  ///< finished, not yet reported
   std::vector<bool> is_done_;
   std::size_t reported_ = 0;
+  std::string record_lines_;
   bool has_failure_ = false, has_cache_warning_ = false;
   std::size_t cached_ = 0;
   Exit last_failure_ = Exit::kOk;

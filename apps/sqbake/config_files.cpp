@@ -18,7 +18,11 @@ namespace fs = std::filesystem;
 constexpr const char* kProjectFile = "sqbake.toml";
 constexpr const char* kSidecarEnd = ".sqbake.toml";
 
+/// A quality takes the place of the limits that weaker sources gave, not of those given beside it.
 void lay_over(SettingValues& values, const SettingValues& stronger) {
+  if (const auto quality = stronger.find("quality"); quality != stronger.end())
+    for (const auto& [name, text] : limits_of(quality->second.text))
+      values[name] = {text, fmt::format("{} (quality {})", quality->second.source, quality->second.text)};
   for (const auto& [name, value] : stronger) values[name] = value;
 }
 
@@ -106,7 +110,9 @@ Result<EffectiveSettings> ConfigFiles::settings_of(const fs::path& mesh, const M
       effective.files.push_back(*sidecar.value());
     }
   }
-  for (const auto& [name, text] : request_.command_line) values[name] = {text, "command line"};
+  SettingValues command_line;
+  for (const auto& [name, text] : request_.command_line) command_line[name] = {text, "command line"};
+  lay_over(values, command_line);
   return effective;
 }
 

@@ -5,7 +5,8 @@
 //            < the matching [[rule]]s of the project file in their order < the sidecar < the command line
 //
 // The project file is the nearest `sqbake.toml` in the folder of the mesh or above it; the sidecar of
-// hand.off is hand.off.sqbake.toml or hand.sqbake.toml beside it.
+// hand.off is hand.off.sqbake.toml or hand.sqbake.toml beside it. A quality counts as the limits that it
+// sets, but for those that the same source gives beside it.
 #pragma once
 
 #include <filesystem>

@@ -105,10 +105,11 @@ void RecordWriter::add_text(const BakeRecord& record) {
                         record.seconds);
   } else {
     const ErrorRow* row = record.finest();
-    text += fmt::format("{:<{}} {:>5} {:>8} {:>9} {:>9} {:>9} {:<10} {:>8.2f}\n", record.name,
-                        options_.name_width, record.parts, record.segments, record.bytes,
-                        row ? percent(row->eq35_percent) : "-",
-                        row ? percent(row->misclassified_3_percent) : "-", record.stopped_by, record.seconds);
+    text +=
+        fmt::format("{:<{}} {:>5} {:>8} {:>9} {:>9} {:>9} {:<10} {:>8}\n", record.name, options_.name_width,
+                    record.parts, record.segments, record.bytes, row ? percent(row->eq35_percent) : "-",
+                    row ? percent(row->misclassified_3_percent) : "-", record.stopped_by,
+                    record.is_cached ? "cached" : fmt::format("{:.2f}", record.seconds));
   }
   if (options_.profile)
     for (const bake::StageTime& time : record.times)

@@ -9,6 +9,8 @@
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
+#include "quantities.hpp"
+
 namespace sqmap::apps {
 namespace {
 
@@ -22,6 +24,10 @@ constexpr std::array<std::pair<std::string_view, bake::UpAxis>, 3> kUpNames{
     {{"x", bake::UpAxis::kX}, {"y", bake::UpAxis::kY}, {"z", bake::UpAxis::kZ}}};
 constexpr std::array<std::pair<std::string_view, bake::Repair>, 3> kRepairNames{
     {{"none", bake::Repair::kNone}, {"safe", bake::Repair::kSafe}, {"all", bake::Repair::kAll}}};
+constexpr std::array<std::pair<std::string_view, bake::Quality>, 3> kQualityNames{
+    {{"draft", bake::Quality::kDraft},
+     {"standard", bake::Quality::kStandard},
+     {"fine", bake::Quality::kFine}}};
 constexpr std::array<std::pair<std::string_view, Fallback>, 2> kFallbackNames{
     {{"none", Fallback::kNone}, {"superquadric", Fallback::kSuperquadric}}};
 
@@ -60,11 +66,20 @@ Outcome apply_repair(AssetOptions& options, std::string_view text) {
   return choose<bake::Repair>(text, kRepairNames, options.bake.repair.policy);
 }
 
+Outcome apply_quality(AssetOptions& options, std::string_view text) {
+  bake::Quality quality{};
+  if (const Outcome ok = choose<bake::Quality>(text, kQualityNames, quality); !ok) return ok.error();
+  options.bake.set(quality);
+  return Done{};
+}
+
 Outcome apply_max_error(AssetOptions& options, std::string_view text) {
   const Result<ErrorTarget> target = parse_error_target(text);
   if (!target) return target.error();
-  options.max_error = target.value();
-  if (target.value().percent > 0) options.bake.max_error_percent = target.value().percent;
+  // The one that does not hold is as by default, so that it does not show in what is recorded.
+  const bool is_length = target.value().length_m > 0;
+  options.bake.max_error_percent = is_length ? bake::BakeOptions{}.max_error_percent : target.value().percent;
+  options.bake.max_error_m = target.value().length_m;
   return Done{};
 }
 
@@ -114,14 +129,22 @@ constexpr AssetOptions kDefaults;
 std::string default_unit() { return "m"; }
 std::string default_up() { return name_of<bake::UpAxis>(kDefaults.bake.read.up, kUpNames); }
 std::string default_repair() { return name_of<bake::Repair>(kDefaults.bake.repair.policy, kRepairNames); }
-std::string default_max_error() { return fmt::format("{}%", kDefaults.bake.max_error_percent); }
-std::string default_max_parts() { return fmt::to_string(kDefaults.bake.max_parts); }
-std::string default_max_bytes() { return fmt::format("{}K", kDefaults.bake.max_bytes / 1024); }
+std::string max_error_text(const bake::BakeOptions& options) {
+  return fmt::format("{}%", options.max_error_percent);
+}
+std::string max_parts_text(const bake::BakeOptions& options) { return fmt::to_string(options.max_parts); }
+std::string max_bytes_text(const bake::BakeOptions& options) {
+  return fmt::format("{}K", options.max_bytes / 1024);
+}
+std::string default_quality() { return "standard"; }
+std::string default_max_error() { return max_error_text(kDefaults.bake); }
+std::string default_max_parts() { return max_parts_text(kDefaults.bake); }
+std::string default_max_bytes() { return max_bytes_text(kDefaults.bake); }
 std::string default_timeout() { return fmt::format("{}s", kDefaults.timeout_s); }
 std::string default_memory() { return "none"; }
 std::string default_fallback() { return name_of<Fallback>(kDefaults.fallback, kFallbackNames); }
 
-constexpr std::array<Setting, 9> kSettings{{
+constexpr std::array<Setting, 10> kSettings{{
     {"unit", "UNIT", "Unit of the coordinates: m, cm, mm, um, in, ft or a number of metres", default_unit,
      apply_unit},
     {"up", "AXIS", "Axis of the input that points up: x, y, z; turned to z", default_up, apply_up},
@@ -129,6 +152,9 @@ constexpr std::array<Setting, 9> kSettings{{
      "none: drop only faces without area; safe: also weld, drop duplicates,\norient; all: also fill small "
      "holes",
      default_repair, apply_repair},
+    {"quality", "NAME",
+     "draft, standard or fine: sets the three limits below, where they are not given\nthemselves",
+     default_quality, apply_quality},
     {"max-error", "PCT|LENGTH",
      "Stop refining at this mean error of eq. 35: a percentage of R_max, the\nlargest distance between two "
      "vertices, or a length such as 0.2mm",
@@ -141,8 +167,9 @@ constexpr std::array<Setting, 9> kSettings{{
     {"memory", "BYTES", "Memory that the bake of a mesh may take, e.g. 2G, or none", default_memory,
      apply_memory},
     {"fallback", "KIND",
-     "For a mesh that ran into a limit, crashed or could not be baked:\nnone, or superquadric: bake one a "
-     "component, uncut, marked as degraded",
+     "For a mesh that ran into a limit, crashed or could not be baked:\nnone, or superquadric: bake one for "
+     "the "
+     "whole mesh, marked as degraded",
      default_fallback, apply_fallback},
 }};
 
@@ -162,13 +189,24 @@ SettingTexts texts_of(const SettingValues& values) {
   return texts;
 }
 
-Result<AssetOptions> options_from(const SettingTexts& texts) {
+SettingTexts limits_of(std::string_view quality) {
   AssetOptions options;
-  for (const auto& [name, text] : texts) {
-    const Setting* setting = find_setting(name);
-    if (setting == nullptr) return Error{Status::kBadOption, fmt::format("unknown setting `{}`", name), ""};
-    if (const Outcome ok = setting->apply(options, text); !ok)
-      return Error{Status::kBadOption, fmt::format("{}: {}", name, ok.error().finding), ""};
+  if (!apply_quality(options, quality)) return {};
+  return {{"max-error", max_error_text(options.bake)},
+          {"max-parts", max_parts_text(options.bake)},
+          {"max-bytes", max_bytes_text(options.bake)}};
+}
+
+Result<AssetOptions> options_from(const SettingTexts& texts) {
+  for (const auto& [name, text] : texts)
+    if (find_setting(name) == nullptr)
+      return Error{Status::kBadOption, fmt::format("unknown setting `{}`", name), ""};
+  AssetOptions options;
+  for (const Setting& setting : kSettings) {
+    const auto given = texts.find(setting.name);
+    if (given == texts.end()) continue;
+    if (const Outcome ok = setting.apply(options, given->second); !ok)
+      return Error{Status::kBadOption, fmt::format("{}: {}", setting.name, ok.error().finding), ""};
   }
   if (const Outcome ok = options.bake.check(); !ok) return ok.error();
   return options;

@@ -4,15 +4,12 @@
 #include <cstdint>
 #include <functional>
 #include <map>
-#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
 
 #include "sqmap/asset/result.hpp"
 #include "sqmap/bake/bake.hpp"
-
-#include "quantities.hpp"
 
 namespace CLI {
 class App;
@@ -26,9 +23,8 @@ enum class Fallback { kNone, kSuperquadric };
 /// Everything that can be chosen for one mesh.
 struct AssetOptions {
   bake::BakeOptions bake;
-  std::optional<ErrorTarget> max_error;  ///< empty: as in `bake`
-  double timeout_s = 900;                ///< of one worker; 0: none
-  std::uint64_t memory_bytes = 0;        ///< of one worker; 0: no limit
+  double timeout_s = 900;          ///< of one worker; 0: none
+  std::uint64_t memory_bytes = 0;  ///< of one worker; 0: no limit
   Fallback fallback = Fallback::kNone;
 };
 
@@ -41,7 +37,7 @@ struct Setting {
   Outcome (*apply)(AssetOptions& options, std::string_view text);
 };
 
-/// All of them, in the order they are shown in.
+/// All of them, in the order they are shown and applied in: a quality before the limits it sets.
 std::span<const Setting> all_settings();
 const Setting* find_setting(std::string_view name);
 
@@ -58,7 +54,11 @@ using SettingValues = std::map<std::string, SettingValue, std::less<>>;
 /// The texts alone.
 SettingTexts texts_of(const SettingValues& values);
 
-/// Errors: kBadOption with the setting and what it must be.
+/// What a quality stands for: texts of max-error, max-parts and max-bytes; none where there is no such
+/// quality.
+SettingTexts limits_of(std::string_view quality);
+
+/// Limits that are given hold, whatever the quality. Errors: kBadOption with the setting and what it must be.
 Result<AssetOptions> options_from(const SettingTexts& texts);
 
 /// Adds `--NAME` for each named setting. A text that cannot be right is refused while parsing. `texts` must

@@ -147,6 +147,11 @@ Result<Decomposition> decompose(const PreparedMesh& prepared, const DecomposeOpt
 
   Decomposition result;
   result.label.assign(mesh.faces.size(), 0);
+  if (options.join_components) {
+    result.reasons = {CutReason::kWhole};
+    progress.at("decompose", 1);
+    return result;
+  }
   for (std::size_t c = 0; c < component_count; ++c) {
     if (faces_of[c].empty()) continue;
     progress.at("decompose", static_cast<double>(c) / static_cast<double>(component_count));

@@ -59,7 +59,7 @@ std::string BakeOptions::to_json() const {
   const auto& [metres_per_unit, up, size_limit] = read_options;  // the limit decides no byte
   const auto& [policy, weld_tolerance, max_hole_edges] = repair_options;
   const auto& [source_count, window, locale_width, boundary_strength, min_hull_gain, k_h, t_h,
-               use_boundary_strength, use_hyperbolic, min_part_area] = decompose_options;
+               use_boundary_strength, use_hyperbolic, join_components, min_part_area] = decompose_options;
   const auto& [min_exponent, max_exponent, max_iterations, min_axis_ratio, quick] = fit_options;
   const nlohmann::json json = {
       {"max_error_percent", error_percent},
@@ -83,6 +83,7 @@ std::string BakeOptions::to_json() const {
         {"t_h", t_h},
         {"use_boundary_strength", use_boundary_strength},
         {"use_hyperbolic", use_hyperbolic},
+        {"join_components", join_components},
         {"min_part_area", min_part_area}}},
       {"fit",
        {{"min_exponent", min_exponent},

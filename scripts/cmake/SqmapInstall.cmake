@@ -35,6 +35,8 @@ if(SQMAP_BUILD_BAKE)
   install(TARGETS sqbake sqinfo sqsim sqbench EXPORT sqmap-bake RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
   install(EXPORT sqmap-bake FILE sqmap-bake-targets.cmake NAMESPACE sqmap:: DESTINATION ${SQMAP_PACKAGE_DIR})
   install(FILES ${CMAKE_CURRENT_LIST_DIR}/SqmapBake.cmake DESTINATION ${SQMAP_PACKAGE_DIR})
+  # What the records of `sqbake bake --format ndjson` keep to.
+  install(FILES ${PROJECT_SOURCE_DIR}/apps/sqbake/bake.schema.json DESTINATION ${CMAKE_INSTALL_DATADIR}/sqmap)
   # Each program writes its own man page and completion scripts.
   set(SQMAP_SHELL_DOCS ${PROJECT_BINARY_DIR}/shell_docs)
   file(MAKE_DIRECTORY ${SQMAP_SHELL_DOCS})

@@ -130,14 +130,20 @@ class Limits(FolderTest):
         self.assertLess(self.record("--max-bytes", "4K", *options)["bytes"],
                         self.record("--max-bytes", "200K", *options)["bytes"])
 
-    def test_an_error_target_in_metres_is_a_share_of_the_size(self):
-        source = write_off(self.folder / "ball.off", sphere(2))  # R_max is 2 cm
-        bundle = self.folder / "ball.h5"
-        self.assert_exit(run("sqbake", "bake", source, "-o", bundle, "--unit", "cm", "--max-error", "0.1mm"), 0)
-        shown = json.loads(run("sqinfo", "show", bundle, "--format", "json").stdout)
-        percent = shown["provenance"]["options"]["max_error_percent"]
-        self.assertLessEqual(percent, 0.5)  # never looser than asked
-        self.assertGreater(percent, 0.5 / 3 ** 0.5 - 1e-9)
+    def test_an_error_target_in_metres_is_a_share_of_the_largest_vertex_distance(self):
+        vertices, faces = sphere(3)  # R_max is 2 cm, the diagonal of the box around it 3.5 cm
+        source = write_off(self.folder / "ball.off", ([(x, y, abs(z) ** 0.5 * z) for x, y, z in vertices], faces))
+        shown = {}
+        for target in ("0.02mm", "0.1%", "0.0577%"):
+            bundle = self.folder / f"{target}.h5"
+            self.assert_exit(run("sqbake", "bake", source, "-o", bundle, "--unit", "cm", "--max-error", target), 0)
+            shown[target] = json.loads(run("sqinfo", "show", bundle, "--format", "json").stdout)
+        self.assertAlmostEqual(shown["0.02mm"]["r_max_m"], 0.02, places=6)
+        self.assertEqual(shown["0.02mm"]["provenance"]["options"]["max_error_m"], 2e-5)
+        self.assertEqual(shown["0.1%"]["provenance"]["options"]["max_error_m"], 0)
+        self.assertEqual(shown["0.02mm"]["parts"], shown["0.1%"]["parts"])
+        self.assertEqual(shown["0.02mm"]["errors"], shown["0.1%"]["errors"])
+        self.assertNotEqual(shown["0.02mm"]["errors"], shown["0.0577%"]["errors"])  # what the diagonal would give
 
     def test_units_and_axes_scale_and_turn(self):
         vertices, faces = sphere(2)  # its axes end at vertices

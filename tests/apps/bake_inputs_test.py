@@ -4,7 +4,7 @@ files and sidecars. All by `--dry-run` and `config show`, but where bytes are th
 import json
 import unittest
 
-from support import ROUGH, FolderTest, box, run, write_off
+from support import ROUGH, FolderTest, box, run, sphere, write_off
 
 
 class Inputs(FolderTest):
@@ -118,6 +118,30 @@ class Settings(FolderTest):
         self.assertEqual(self.shown("--manifest", manifest, "--max-parts", "6")["max-parts"], ("6", "command line"))
         self.assertEqual(self.shown("--no-config")["max-parts"], ("24", "built in"))
 
+    def test_a_quality_sets_the_limits_that_are_not_given_beside_it(self):
+        limits = ("max-error", "max-parts", "max-bytes")
+        plain = self.shown()
+        for name, expected in (("draft", ("0.2%", "12", "64K")), ("standard", ("0.05%", "24", "128K")),
+                               ("fine", ("0.025%", "48", "256K"))):
+            shown = self.shown("--quality", name)
+            self.assertEqual(shown["quality"], (name, "command line"))
+            self.assertEqual([shown[limit] for limit in limits],
+                             [(value, f"command line (quality {name})") for value in expected])
+            if name == "standard":
+                self.assertEqual([shown[limit][0] for limit in limits], [plain[limit][0] for limit in limits])
+        for options in (("--quality", "fine", "--max-parts", "5"), ("--max-parts", "5", "--quality", "fine")):
+            shown = self.shown(*options)
+            self.assertEqual((shown["max-parts"], shown["max-error"][0]), (("5", "command line"), "0.025%"))
+
+    def test_a_quality_replaces_the_limits_of_weaker_sources_only(self):
+        project = self.write("sqbake.toml", '[default]\nmax-parts = 7\nquality = "draft"\n'
+                                            '[[rule]]\nmatch = "props/*"\nmax-bytes = "90K"\n')
+        shown = self.shown()
+        self.assertEqual((shown["max-parts"], shown["max-error"], shown["max-bytes"][0]),
+                         (("7", f"{project}:2"), ("0.2%", f"{project}:3 (quality draft)"), "90K"))
+        shown = self.shown("--quality", "fine", "--max-error", "3%")
+        self.assertEqual([shown[name][0] for name in ("max-error", "max-parts", "max-bytes")], ["3%", "48", "256K"])
+
     def test_rules_match_below_their_file_and_the_last_one_wins(self):
         self.write("sqbake.toml", '[[rule]]\nmatch = "*.off"\nup = "x"\nunit = "mm"\n'
                                   '[[rule]]\nmatch = "props/c*.off"\nup = "y"\n[[rule]]\nmatch = "other/**"\nup = "z"\n')
@@ -139,6 +163,7 @@ class Settings(FolderTest):
                  ("sqbake.toml", "unit = 1\n", [":1", "unknown key `unit`", "[default]"]),
                  ("sqbake.toml", "[default]\nup = \"w\"\n", [":2", "`w`", "x, y, z"]),
                  ("sqbake.toml", "[default]\nup = [1]\n", [":2", "up"]),
+                 ("sqbake.toml", '[default]\nquality = "good"\n', [":2", "`good`", "draft, standard, fine"]),
                  ("sqbake.toml", "[default\n", ["sqbake.toml:1"]),
                  ("sqbake.toml", "[[rule]]\nunit = 1\n", [":1", "match"]),
                  ("sqbake.toml", "[default]\nmax-parts = 0\n", [":2", "max_parts = 0"]),
@@ -168,9 +193,20 @@ class Settings(FolderTest):
         self.assertEqual(beside.read_bytes(), given.read_bytes())
         self.assertNotEqual(beside.read_bytes(), plain.read_bytes())
 
+    def test_a_quality_bakes_the_bytes_of_the_limits_it_stands_for(self):
+        write_off(self.mesh, sphere(2))
+        bundles = {}
+        for name, options in (("draft", ("--quality", "draft")), ("plain", ()),
+                              ("limits", [word for limit in ("max-error", "max-parts", "max-bytes")
+                                          for word in (f"--{limit}", self.shown("--quality", "draft")[limit][0])])):
+            self.assert_exit(run("sqbake", "bake", self.mesh, *options, "-o", self.folder / f"{name}.h5"), 0)
+            bundles[name] = (self.folder / f"{name}.h5").read_bytes()
+        self.assertEqual(bundles["draft"], bundles["limits"])
+        self.assertNotEqual(bundles["draft"], bundles["plain"])
+
     def test_config_show_prints_every_setting_with_its_source(self):
         text = run("sqbake", "config", "show", self.mesh, "--timeout", "5m").stdout
-        for name in ("unit", "up", "repair", "max-error", "max-parts", "max-bytes", "memory", "fallback"):
+        for name in ("unit", "up", "repair", "quality", "max-error", "max-parts", "max-bytes", "memory", "fallback"):
             self.assertRegex(text, rf"(?m)^  {name} +\S+ +built in$")
         self.assertRegex(text, r"(?m)^  timeout +5m +command line$")
 

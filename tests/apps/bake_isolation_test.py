@@ -199,7 +199,9 @@ class Degraded(FolderTest):
         self.assertEqual(records_of(result.stdout)[0]["outcome"], "ok")
 
     def test_the_fallback_is_marked_in_log_record_and_bundle_and_bounds_the_mesh(self):
-        mesh = bent(4, 1)
+        (vertices, faces), (box_vertices, box_faces) = bent(4, 1), box()
+        mesh = (vertices + [(x + 9, y, z) for x, y, z in box_vertices],  # two components
+                faces + [tuple(i + len(vertices) for i in face) for face in box_faces])
         source = write_off(self.folder / "bent.off", mesh)
         output = self.folder / "bent.h5"
         process = subprocess.Popen(
@@ -209,12 +211,13 @@ class Degraded(FolderTest):
         stdout, stderr = process.communicate(timeout=TIMEOUT_S)
         self.assertEqual(process.returncode, 0, stderr)
         record = records_of(stdout)[0]
-        self.assertEqual((record["outcome"], record["parts"]), ("degraded", 1))
+        self.assertEqual((record["outcome"], record["mesh"]["components"], record["parts"]), ("degraded", 2, 1))
         self.assertEqual(record["degradations"][0]["id"], "fallback")
         self.assertIn("crashed", record["degradations"][0]["finding"])
         self.assertIn("degraded: one superquadric", stderr)
         shown = json.loads(run("sqinfo", "show", output, "--format", "json").stdout)
         self.assertEqual(shown["provenance"]["options"]["fallback"], "superquadric")
+        self.assertTrue(shown["provenance"]["options"]["decompose"]["join_components"])
         points = "".join(f"{x!r},{y!r},{z!r}\n" for x, y, z in mesh[0])
         layer_1 = run("sqinfo", "query", output, "--points", "-", "--layer", "1", input=points)
         self.assert_exit(layer_1, 0)

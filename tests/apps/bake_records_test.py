@@ -79,6 +79,15 @@ class Records(FolderTest):
         for bundle in (self.folder / "cold").iterdir():
             self.assertEqual((self.folder / "other" / bundle.name).read_bytes(), bundle.read_bytes())
 
+    def test_the_table_says_which_bundles_came_from_the_cache(self):
+        options = (*ROUGH, "--cache", self.folder / "cache")
+        run("sqbake", "bake", self.models / "ball.off", *options, "-o", self.folder / "ball.h5")
+        result = run("sqbake", "bake", self.models, *options, "--out-dir", self.out)
+        ends = {line.split()[0]: line.split()[-1] for line in result.stdout.splitlines()}
+        self.assertEqual(ends["ball.off"], "cached")
+        self.assertRegex(ends["open.off"], r"^\d+\.\d\d$")
+        self.assertIn("1 of them from the cache", result.stderr)
+
     def test_a_fallback_or_a_limit_is_never_kept(self):
         cache = ("--cache", self.folder / "cache", "--format", "ndjson")
         source = self.models / "ball.off"

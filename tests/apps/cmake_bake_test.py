@@ -23,6 +23,8 @@ class BakedProject(FolderTest):
         self.environment = {**os.environ, "SQMAP_CACHE_DIR": str(self.folder / "cache")}
         self.source, self.build, self.prefix = (self.folder / name for name in ("source", "build", "prefix"))
         self.command("cmake", "--install", BIN.parent, "--prefix", self.prefix)
+        schema = Path(os.environ["SQMAP_SOURCE_DIR"]) / "apps" / "sqbake" / "bake.schema.json"
+        self.assertEqual((self.prefix / "share" / "sqmap" / schema.name).read_bytes(), schema.read_bytes())
         shutil.copytree(SAMPLE, self.source)
         self.configure()
         self.assertEqual(self.bake_what_changed(), TOYS | FURNITURE)

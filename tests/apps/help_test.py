@@ -5,7 +5,8 @@ import unittest
 
 from support import run
 
-COMMANDS = {"sqbake": ["bake", "check"], "sqinfo": ["show", "validate", "query", "export", "diff"], "sqbench": ["run"]}
+COMMANDS = {"sqbake": ["bake", "check", "config", "cache", "report", "plan", "merge"],
+            "sqinfo": ["show", "validate", "query", "export", "diff"], "sqbench": ["run"]}
 
 
 class Help(unittest.TestCase):
@@ -18,6 +19,11 @@ class Help(unittest.TestCase):
                     self.assertEqual(result.stderr, "")
                     self.assertLess(result.stdout.index("Examples:"), result.stdout.index("Options:"))
                     self.assertIn(f"  {program} {' '.join(arguments)}", result.stdout)
+
+    def test_options_are_shown_as_they_are_typed(self):
+        text = run("sqbake", "bake", "--help").stdout
+        self.assertRegex(text, r"(?m)^  --no-cache +Bake all")
+        self.assertNotRegex(text, r"[{}]")
 
     def test_prints_the_table_of_exit_codes(self):
         table = re.findall(r"^ +(\d+)  \S", run("sqbake", "--help").stdout.split("Exit codes:")[1], re.MULTILINE)
@@ -41,7 +47,8 @@ class Usage(unittest.TestCase):
         (("sqbake",), "subcommand"),
         (("sqbake", "bkae", "x.off"), "`bkae`"),
         (("sqbake", "bake"), "INPUT"),
-        (("sqbake", "bake", "x.off", "--quality", "9"), "--quality"),
+        (("sqbake", "bake", "x.off", "--quality", "9"), "draft, standard, fine"),
+        (("sqbake", "bake", "x.off", "-o", "x.h5", "--colourful"), "--colourful"),
         (("sqbake", "bake", "x.off", "-o", "x.h5", "--unit", "parsec"), "`parsec`"),
         (("sqbake", "bake", "x.off", "-o", "x.h5", "--max-error", "-1%"), "`-1%`"),
         (("sqbake", "bake", "x.off", "-o", "x.h5", "--max-error", "1 acre"), "`1 acre`"),
@@ -52,6 +59,14 @@ class Usage(unittest.TestCase):
         (("sqbake", "bake", "x.off", "-o", "x.h5", "--memory", "4M"), "16M"),
         (("sqbake", "bake", "x.off", "-o", "x.h5", "-q", "-v"), "--quiet"),
         (("sqbake", "check"), "INPUT"),
+        (("sqbake", "config"), "subcommand"),
+        (("sqbake", "config", "show"), "MESH"),
+        (("sqbake", "config", "show", "x.off", "--quality", "best"), "`best`"),
+        (("sqbake", "cache"), "subcommand"),
+        (("sqbake", "cache", "gc", "--max-size", "lots"), "`lots`"),
+        (("sqbake", "report", "-"), "--output"),
+        (("sqbake", "plan"), "--out-dir"),
+        (("sqbake", "merge"), "RECORDS"),
         (("sqinfo", "show"), "BUNDLE"),
         (("sqinfo", "query", "x.h5"), "--points"),
         (("sqinfo", "query", "x.h5", "--points", "-", "--layer", "4"), "--layer"),

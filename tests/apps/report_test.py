@@ -9,7 +9,7 @@ import unittest
 import zlib
 from html.parser import HTMLParser
 
-from support import FolderTest, ROUGH, box, run, sphere
+from support import FolderTest, ROUGH, box, run, sphere, write_off
 
 VOID = {"meta", "img", "input", "br"}
 
@@ -110,6 +110,28 @@ class Report(FolderTest):
         self.assertEqual([r for r in page.references if not r.startswith("data:")], [])
         self.assertNotRegex(text, r"https?://|@import|url\(")
         self.assertEqual(len(page.images), 2)
+
+    def test_a_bake_writes_the_page_of_its_records_also_where_a_mesh_fails(self):
+        models, page = self.folder / "models", self.folder / "page.html"
+        models.mkdir()
+        write_off(models / "ball.off", sphere(2))
+        (models / "broken.off").write_text("OFF\n1 1 0\n", encoding="ascii")
+        result = run("sqbake", "bake", models, *ROUGH, "--out-dir", self.folder / "out", "--report", page, "--format",
+                     "ndjson")
+        self.assert_exit(result, 1)
+        again = run("sqbake", "report", "-", "-o", "-", "--title", f"sqbake bake {models}", input=result.stdout)
+        self.assertEqual(page.read_text(encoding="utf-8"), again.stdout)
+        self.assertEqual([row[:2] for row in Page(again.stdout).tables["all"][1:]],
+                         [[str(models / "ball.off"), "ok"], [str(models / "broken.off"), "failed"]])
+        self.assertEqual(len(Page(again.stdout).images), 1)
+
+    def test_a_bake_refuses_a_report_it_could_not_write_before_it_begins(self):
+        source = write_off(self.folder / "ball.off", sphere(1))
+        for name, code, named in (("ball.off", 2, ".html"), ("none/page.html", 3, "no folder")):
+            result = run("sqbake", "bake", source, *ROUGH, "-o", self.folder / "a.h5", "--report", self.folder / name)
+            self.assert_exit(result, code)
+            self.assertIn(named, result.stderr)
+        self.assertEqual(self.files(), ["ball.off"])
 
     def test_names_from_strangers_stay_text(self):
         name = "<script>alert(1)</script>\"'&.off"

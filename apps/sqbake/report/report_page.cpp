@@ -13,7 +13,6 @@
 
 #include "sqmap/io/bundle.hpp"
 
-#include "../../common/files.hpp"
 #include "html.hpp"
 #include "part_picture.hpp"
 
@@ -270,13 +269,6 @@ std::string report_page(std::span<const AssetRecord> records, const ReportOption
          html_text(options.title) + "</h1>\n" + summary(records) + failures(records) +
          largest_errors(records) + slowest(records) + gallery(records, options.picture_count) +
          all_assets(records) + "<script>" + kScript + "</script>\n</body></html>\n";
-}
-
-Outcome write_report(std::string_view ndjson, const std::filesystem::path& file,
-                     const ReportOptions& options) {
-  const Result<AssetRecords> records = parse_asset_records(ndjson, "records");
-  if (!records) return records.error();
-  return write_file(file, report_page(records.value().records, options));
 }
 
 }  // namespace sqmap::apps

@@ -2,12 +2,8 @@
 #pragma once
 
 #include <cstddef>
-#include <filesystem>
 #include <span>
 #include <string>
-#include <string_view>
-
-#include "sqmap/asset/result.hpp"
 
 #include "asset_records.hpp"
 
@@ -23,10 +19,5 @@ struct ReportOptions {
 /// errors, the slowest assets with their stages, all assets, and pictures of the bundles that can still be
 /// read. The same records and bundles give the same page.
 std::string report_page(std::span<const AssetRecord> records, const ReportOptions& options);
-
-/// Writes the page of NDJSON records, as `sqbake bake --format ndjson` prints them.
-/// Errors: kInvalidAsset, kFileUnwritable.
-Outcome write_report(std::string_view ndjson, const std::filesystem::path& file,
-                     const ReportOptions& options);
 
 }  // namespace sqmap::apps

@@ -27,6 +27,8 @@ struct DecomposeOptions {
   double t_h = 10.0;  ///< mean |Gaussian curvature| there times the component's area, >= 0
   bool use_boundary_strength = true;
   bool use_hyperbolic = true;
+  bool join_components =
+      false;  ///< one segment for the whole mesh, however many components it has; nothing is cut
   double min_part_area = 0.02;  ///< smallest part cut off, in (0, 0.5]; components smaller than this share of
                                 ///< the whole mesh stay whole
 
@@ -40,9 +42,9 @@ struct Decomposition {
   std::vector<CutReason> reasons;    ///< the last cut that separated each segment
 };
 
-/// Cuts each component along borders of its locales. Segments are connected over edges and numbered by
-/// descending area (ties: by centroid). The result does not depend on the number of threads. Errors:
-/// kBadOption; kCancelled; kInvalidMesh when `prepared.component` does not match the faces.
+/// Cuts each component along borders of its locales. Segments are connected over edges, unless components are
+/// joined, and numbered by descending area (ties: by centroid). The result does not depend on the number of
+/// threads. Errors: kBadOption; kCancelled; kInvalidMesh when `prepared.component` does not match the faces.
 Result<Decomposition> decompose(const PreparedMesh& prepared, const DecomposeOptions& options,
                                 const Progress& progress);
 

@@ -1,0 +1,43 @@
+# SPDX-License-Identifier: Apache-2.0
+"""scripts/load_test bakes as many meshes as it is told to, and finds a process or a file that a run leaves behind."""
+import os
+import re
+import subprocess
+import unittest
+from pathlib import Path
+
+from support import BIN, TIMEOUT_S, FolderTest, box, write_off
+
+LOAD_TEST = Path(os.environ["SQMAP_SOURCE_DIR"]) / "scripts" / "load_test"
+ROW = re.compile(r"(?m)^-j(\d) .* / \d+ .* / \d+ +(\d+) +(\d+) +(\d+)$")
+
+
+class LoadTest(FolderTest):
+    def load(self, binaries, *options):
+        """Exit code; processes left, files left and failures of each run; all that was printed."""
+        mesh = write_off(self.folder / "box.off", box())
+        result = subprocess.run([LOAD_TEST, "2", "--meshes", mesh, "--bin", binaries, *options], capture_output=True,
+                                text=True, timeout=TIMEOUT_S, check=False)
+        rows = [tuple(map(int, row)) for row in ROW.findall(result.stdout)]
+        return result.returncode, rows, result.stdout + result.stderr
+
+    def test_a_sound_baker_bakes_all_and_leaves_nothing(self):
+        kept = self.folder / "kept"
+        code, rows, text = self.load(BIN, "--keep", kept)
+        self.assertEqual((code, rows), (0, [(1, 0, 0, 0), (2, 0, 0, 0)]), text)
+        self.assertIn("bundles that differ: 0", text)
+        for run in ("j1", "j2"):
+            self.assertEqual(sorted(p.name for p in (kept / run).iterdir()), ["00000_box.h5", "00001_box.h5"])
+
+    def test_what_is_left_over_or_not_baked_is_counted(self):
+        for trick, row in (("sleep 100 >/dev/null 2>&1 &", (1, 0, 0)),
+                           ('mkdir -p "$4"; touch "$4/stray"; echo > "$2/00000_box.ply"', (0, 1, 1))):
+            with self.subTest(trick=trick):
+                (self.folder / "sqbake").write_text(f'#!/bin/sh\n{trick}\nexec "{BIN}/sqbake" "$@"\n', encoding="utf-8")
+                (self.folder / "sqbake").chmod(0o755)
+                code, rows, text = self.load(self.folder)
+                self.assertEqual((code, rows), (1, [(1, *row), (2, *row)]), text)
+
+
+if __name__ == "__main__":
+    unittest.main()
