@@ -3,6 +3,7 @@
 #include <string_view>
 
 #include "commands.hpp"
+#include "plain_math.hpp"
 #include "worker.hpp"
 #include "worker_messages.hpp"
 
@@ -29,6 +30,7 @@ constexpr const char* kExamples =
 }  // namespace
 
 int main(int argc, char** argv) {
+  sqmap::apps::use_plain_math(argv);
   // Not a command for people: how sqbake starts itself.
   if (argc == 3 && std::string_view(argv[1]) == sqmap::apps::kWorkerCommand)
     return sqmap::apps::run_worker(argv[2]);

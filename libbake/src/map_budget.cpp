@@ -22,7 +22,7 @@ constexpr std::uint32_t kLeastQuadrantCells = 4;
 // pass silhouettes and seams between texels put a share of space on the wrong side). A bound of errors over
 // whole rays; what points near the surface meet is less, by a factor found on the sample meshes.
 constexpr double kInterpolationShare = 1.6;
-constexpr double kOccupancyShare = 1.15;
+constexpr double kOccupancyShare = 1.12;
 // A uniform quantiser of step q errs by q/4 on average.
 constexpr double kStepShare = 1.0;
 

@@ -46,8 +46,16 @@ inline constexpr float kLeastAngle =
     1e-6F;  ///< squared sine between rows and columns, below which one is a pole
 /// Cells: shorter steps end the search. On the sample meshes 0.001 finds the same distances to 1e-7 of R_max.
 inline constexpr float kLeastCellStep = 0.03F;
-inline constexpr int kStartRings =
-    5;  ///< rings of cells, at doubling distances, in which layer 3 looks for a patch to start from
+/// Eight cells around a place on each of some rings, at doubling distances, in which layer 3 looks for
+/// another start.
+struct Rings {
+  int first, end;   ///< ring r lies 2^r cells away
+  bool is_for_any;  ///< a ring with a patch is the last one
+};
+inline constexpr Rings kBeside{0, 5, true};      ///< when the foot's own cell bounds no patch
+inline constexpr Rings kElsewhere{1, 5, false};  ///< when the surface that was found lies far off
+/// A start elsewhere must be nearer than the surface that was found by this factor.
+inline constexpr float kNearer = 0.9F;
 
 /// Layer 1: F(p) <= 1 (FORMAT.md S1), from powers of the unit coordinates.
 inline bool in_superquadric(const PartRecord& part, const Vec3f& p) noexcept {
@@ -88,10 +96,14 @@ class Chart {
 
   /// Layers 2 and 3 for a point inside the superquadric. edge > 0: also the offset for faces with such edges.
   ChartAnswer look(const Vec3f& p, bool third, std::uint32_t level, float edge) const noexcept;
-  /// Where layer 3 starts when the foot's own cell bounds no patch (beside a seam or a silhouette): the
-  /// centre of the nearest cell that does, of those in eight directions on the first ring that has any.
-  /// False: none.
-  bool patch_beside(const Vec3f& p, std::uint32_t level, float& row, float& col) const noexcept;
+  /// The centre of the cell nearest to p, of those on `rings` around (row, col) that bound a patch nearer
+  /// than the square root of `within_square`. False: none.
+  bool nearest_start(const Vec3f& p, std::uint32_t stride, const Rings& rings, float within_square,
+                     float& row, float& col) const noexcept;
+  /// Beyond this distance, about a cell, a walk may have ended on the wrong surface.
+  static float far_from(const PartRecord& part, std::uint32_t stride) noexcept {
+    return part.sphere_radius * (2 * static_cast<float>(stride) / static_cast<float>(part.rows));
+  }
   /// delta of QueryOptions::edge_length_m at a place of the map.
   float offset(float row, float col, std::uint32_t level, float edge) const noexcept;
 
@@ -182,11 +194,21 @@ inline ChartAnswer Chart::look(const Vec3f& p, bool third, std::uint32_t level, 
     ChartAnswer refined = answer;
     // An inner point needs a distance, or it would feel no force.
     if (std::isfinite(answer.distance) ||
-        (answer.inside && patch_beside(p, level, refined.row, refined.col))) {
+        (answer.inside && nearest_start(p, stride, kBeside, std::numeric_limits<float>::infinity(),
+                                        refined.row, refined.col))) {
       third_layer(p, stride, refined);
     }
     // A second sheet behind the first has no patch of its own: its ray distance stands where it is nearer.
     if (!answer.behind_first || refined.distance < answer.distance) answer = refined;
+    // The walk goes downhill only: where the surface is far, another hillside may be nearer.
+    if (std::isfinite(answer.distance) && answer.distance > far_from(part_, stride)) {
+      const float within = kNearer * answer.distance;
+      refined = answer;
+      if (nearest_start(p, stride, kElsewhere, within * within, refined.row, refined.col)) {
+        third_layer(p, stride, refined);
+        if (refined.distance < answer.distance) answer = refined;
+      }
+    }
   }
   if (edge > 0 && std::isfinite(answer.distance)) answer.offset = offset(answer.row, answer.col, level, edge);
   return answer;
@@ -283,18 +305,19 @@ inline ChartAnswer Chart::second_layer(const Foot<float>& foot, std::uint32_t st
   return answer;
 }
 
-inline bool Chart::patch_beside(const Vec3f& p, std::uint32_t level, float& row, float& col) const noexcept {
-  const std::uint32_t stride = part_.stride_at(level);
+inline bool Chart::nearest_start(const Vec3f& p, std::uint32_t stride, const Rings& rings,
+                                 float within_square, float& row, float& col) const noexcept {
   const auto turn = static_cast<float>(part_.cols);
   const float half = static_cast<float>(stride) / 2, last = static_cast<float>(part_.rows - 1) - half;
-  const Cell foot_cell = cell_at(row, col, stride);
-  const float mid_row = static_cast<float>(foot_cell.row) + half,
-              mid_col = static_cast<float>(foot_cell.col) + half;
-  float best_square = std::numeric_limits<float>::infinity();
-  for (int ring = 0; ring < kStartRings && !std::isfinite(best_square); ++ring) {
+  const Cell middle = cell_at(row, col, stride);
+  const float mid_row = static_cast<float>(middle.row) + half,
+              mid_col = static_cast<float>(middle.col) + half;
+  float best_square = within_square;
+  bool found = false;
+  for (int ring = rings.first; ring < rings.end && !(found && rings.is_for_any); ++ring) {
     const auto step = static_cast<float>(stride << ring);
     for (int k = 0; k < 9; ++k) {
-      if (k == 4) continue;  // the foot's own cell
+      if (k == 4) continue;  // the middle
       const int rows_up = k / 3 - 1;
       const float here_row = mid_row + static_cast<float>(rows_up) * step;
       float here_col = mid_col + static_cast<float>(k % 3 - 1) * step;
@@ -309,9 +332,10 @@ inline bool Chart::patch_beside(const Vec3f& p, std::uint32_t level, float& row,
       best_square = dot(d, d);
       row = here_row;
       col = here_col;
+      found = true;
     }
   }
-  return std::isfinite(best_square);
+  return found;
 }
 
 inline void Chart::step_towards(const Patch& patch, const Vec3f& error, std::uint32_t stride, float& d_row,

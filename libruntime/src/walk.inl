@@ -34,7 +34,7 @@ struct alignas(64) Fans {
   std::uint32_t count = 0;
 };
 
-/// Entries whose foot's cell bounds no patch.
+/// Entries that need another start.
 struct alignas(64) Lost {
   std::int32_t entry[kPadded];
   std::uint32_t count = 0;
@@ -66,9 +66,10 @@ class Walker {
       walk(load3(entries_.x, entries_.y, entries_.z, i), hn::LoadU(kD, entries_.row + i),
            hn::LoadU(kD, entries_.col + i), entry, eligible);
     }
-    if (lost.count > 0) seek(lost);
+    if (lost.count > 0) seek(lost, kBeside);
     go_on();
     if (fans_.count > 0) fans();
+    seek_elsewhere(begin, end, asked);
   }
 
  private:
@@ -80,7 +81,9 @@ class Walker {
   SQMAP_KERNEL Walk begin(const V3& p, V row, V col, VCell& cell) const noexcept;
   HWY_NOINLINE void walk(const V3& p, V row, V col, VI entry, M lanes) noexcept;
   HWY_NOINLINE void go_on() noexcept;
-  HWY_NOINLINE void seek(const Lost& lost) noexcept;
+  HWY_NOINLINE void seek(const Lost& lost, const Rings& rings) noexcept;
+  HWY_NOINLINE void seek_elsewhere(std::uint32_t begin, std::uint32_t end,
+                                   const std::int32_t* asked) noexcept;
   HWY_NOINLINE void keep(Walk& walk, VI entry, M lanes) noexcept;
   HWY_NOINLINE void end(const Walk& walk, VI entry, M lanes) noexcept;
   HWY_NOINLINE M set_aside(const Walk& walk, const VCell& cell, VI entry, M lanes) noexcept;
@@ -94,6 +97,7 @@ class Walker {
   Entries& entries_;
   Pending pending_;
   Fans fans_;
+  bool must_be_nearer_ = false;  ///< what is written must be nearer than what is known
 };
 
 /// Chart::step_towards, for some lanes.
@@ -230,8 +234,8 @@ HWY_NOINLINE void Walker::go_on() noexcept {
   pending_.count = 0;
 }
 
-/// Chart::patch_beside, then walks from there.
-HWY_NOINLINE void Walker::seek(const Lost& lost) noexcept {
+/// Chart::nearest_start around (row, col), then walks from there.
+HWY_NOINLINE void Walker::seek(const Lost& lost, const Rings& rings) noexcept {
   const float last = looker_.last_row() - looker_.size() / 2;
   const V half = all(looker_.size() / 2), turn = all(looker_.turn()), zero = hn::Zero(kD);
   const V infinity = all(std::numeric_limits<float>::infinity());
@@ -242,14 +246,16 @@ HWY_NOINLINE void Walker::seek(const Lost& lost) noexcept {
                            HWY_ATTR { return hn::IfThenElseZero(lanes, hn::GatherIndex(kD, values, entry)); };
     const V3 p{field(entries_.x), field(entries_.y), field(entries_.z)};
     V row = field(entries_.row), col = field(entries_.col);
-    const VCell foot = looker_.cell_at(row, col);
-    const V mid_row = to_float(foot.row) + half, mid_col = to_float(foot.col) + half;
-    V best = infinity;
+    const VCell middle = looker_.cell_at(row, col);
+    const V mid_row = to_float(middle.row) + half, mid_col = to_float(middle.col) + half;
+    const V within = all(kNearer) * field(entries_.distance);
+    const V limit = rings.is_for_any ? infinity : within * within;
+    V best = limit;
     M seeking = lanes;
-    for (int ring = 0; ring < kStartRings; ++ring) {
+    for (int ring = rings.first; ring < rings.end; ++ring) {
       const V step = all(static_cast<float>(looker_.stride() << ring));
       for (int k = 0; k < 9; ++k) {
-        if (k == 4) continue;  // the foot's own cell
+        if (k == 4) continue;  // the middle
         const V here_row = mid_row + all(static_cast<float>(k / 3 - 1)) * step;
         V here_col = mid_col + all(static_cast<float>(k % 3 - 1)) * step;
         here_col = pick(hn::Lt(here_col, zero), here_col + turn, here_col);
@@ -268,12 +274,37 @@ HWY_NOINLINE void Walker::seek(const Lost& lost) noexcept {
         row = pick(better, here_row, row);
         col = pick(better, here_col, col);
       }
-      seeking = hn::AndNot(hn::Lt(best, infinity), seeking);
+      if (!rings.is_for_any) continue;
+      seeking = hn::AndNot(hn::Lt(best, limit), seeking);
       if (none(seeking)) break;
     }
-    const M found = hn::And(lanes, hn::Lt(best, infinity));
+    const M found = hn::And(lanes, hn::Lt(best, limit));
     if (!none(found)) walk(p, row, col, entry, found);
   }
+}
+
+/// The walk goes downhill only: where the surface is far, another hillside may be nearer.
+HWY_NOINLINE void Walker::seek_elsewhere(std::uint32_t begin, std::uint32_t end,
+                                         const std::int32_t* asked) noexcept {
+  const V far = all(Chart::far_from(part_, looker_.stride()));
+  const V infinity = all(std::numeric_limits<float>::infinity());
+  Lost far_off;
+  for (std::uint32_t i = begin; i < end; i += lane_count()) {
+    const VI wished = hn::GatherIndex(kDI, asked, hn::LoadU(kDI, entries_.point + i));
+    const M wanted = hn::And(hn::FirstN(kD, end - i), as_float(hn::Gt(wished, hn::Zero(kDI))));
+    const V distance = hn::LoadU(kD, entries_.distance + i);
+    const M is_far = hn::And(wanted, hn::And(hn::Gt(distance, far), hn::Lt(distance, infinity)));
+    if (none(is_far)) continue;
+    const VI entry = hn::Iota(kDI, static_cast<std::int32_t>(i));
+    hn::StoreU(hn::Compress(entry, hn::RebindMask(kDI, is_far)), kDI, far_off.entry + far_off.count);
+    far_off.count += static_cast<std::uint32_t>(hn::CountTrue(kD, is_far));
+  }
+  if (far_off.count == 0) return;
+  must_be_nearer_ = true;
+  seek(far_off, kElsewhere);
+  go_on();
+  if (fans_.count > 0) fans();
+  must_be_nearer_ = false;
 }
 
 HWY_NOINLINE void Walker::end(const Walk& walk, VI entry, M lanes) noexcept {
@@ -299,15 +330,17 @@ HWY_INLINE void Walker::write(VI entry, M lanes, V row, V col, V on_rim, V dista
                               const V3& normal) noexcept {
   const VI nobody = hn::Set(kDI, kNobody), at = pick(lanes, entry, nobody);
   const VI flags = hn::GatherIndex(kDI, entries_.flags, at);
-  const M behind = as_float(hn::Ne(hn::And(flags, all_int(kBehind)), hn::Zero(kDI)));
+  // A second sheet behind the first has no patch of its own: its ray distance stands where it is nearer.
+  M has_rival = as_float(hn::Ne(hn::And(flags, all_int(kBehind)), hn::Zero(kDI)));
+  if (must_be_nearer_) has_rival = lanes;
   VI to = at;
-  if (!none(hn::And(lanes, behind))) {
-    // A second sheet behind the first has no patch of its own: its ray distance stands where it is nearer.
-    const V second = hn::GatherIndex(kD, entries_.distance, at);
-    to = pick(hn::AndNot(hn::Lt(distance, second), behind), nobody, at);
+  if (!none(hn::And(lanes, has_rival))) {
+    const V known = hn::GatherIndex(kD, entries_.distance, at);
+    to = pick(hn::AndNot(hn::Lt(distance, known), has_rival), nobody, at);
   }
   const VI faces = pick(hn::Gt(on_rim, hn::Zero(kD)), hn::Zero(kDI), all_int(kFaces));
-  hn::ScatterIndex(hn::Or(hn::Or(flags, faces), all_int(kRefined | kPatch)), kDI, entries_.flags, to);
+  const VI others = hn::AndNot(all_int(kFaces), flags);
+  hn::ScatterIndex(hn::Or(hn::Or(others, faces), all_int(kRefined | kPatch)), kDI, entries_.flags, to);
   hn::ScatterIndex(distance, kD, entries_.distance, to);
   hn::ScatterIndex(row, kD, entries_.row, to);
   hn::ScatterIndex(col, kD, entries_.col, to);

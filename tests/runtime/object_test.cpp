@@ -49,6 +49,21 @@ Worst worst_errors(const Object& object, Layer layer, std::uint32_t level) {
   return worst;
 }
 
+// From the foot point of a deep point, downhill ends on a nearer hillside of the map, not at the nearest
+// point.
+TEST(Object, FindsTheNearestSurfaceOfDeepPointsToo) {
+  const Object object = built(test::ball_in_ellipsoid(kRadius, 65, 128));
+  std::mt19937_64 rng(11);
+  for (const double depth_m : {0.2, 0.3, 0.35}) {
+    for (int i = 0; i < 1000; ++i) {
+      const Vec3d direction = i == 0 ? normalized(Vec3d{-0.14941, -0.06768, -1}) : random_direction(rng);
+      const Vec3d p = kCentre + (kRadius - depth_m) * direction;
+      const Answer answer = object.query(cast<float>(p), {Layer::kThree});
+      EXPECT_NEAR(answer.signed_distance_m, -depth_m, 0.01) << depth_m << " m below " << i;
+    }
+  }
+}
+
 TEST(Object, ThirdLayerTellsTheDistanceToABall) {
   const Worst worst = worst_errors(built(test::ball_in_ellipsoid(kRadius, 65, 128)), Layer::kThree, 0);
   EXPECT_LT(worst.distance_m, 1e-3);
