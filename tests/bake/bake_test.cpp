@@ -169,6 +169,7 @@ TEST(Bake, WritesDownEveryOptionThatDecidesTheBytes) {
   EXPECT_TRUE(changes([](BakeOptions& o) { o.decompose.min_hull_gain = 0.06; }));
   EXPECT_TRUE(changes([](BakeOptions& o) { o.decompose.use_hyperbolic = false; }));
   EXPECT_TRUE(changes([](BakeOptions& o) { o.decompose.locale_width = 0.02; }));
+  EXPECT_TRUE(changes([](BakeOptions& o) { o.decompose.join_components = true; }));
   EXPECT_TRUE(changes([](BakeOptions& o) { o.fit.quick = true; }));
   EXPECT_TRUE(changes([](BakeOptions& o) { o.read.up = UpAxis::kY; }));
   EXPECT_TRUE(changes([](BakeOptions& o) { o.repair.max_hole_edges = 7; }));

@@ -1,0 +1,264 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <numbers>
+#include <random>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "sqmap/bake/bake.hpp"
+#include "sqmap/runtime/object.hpp"
+
+#include "support/shapes.hpp"
+
+// Shapes whose inside everybody knows, judged by formulas of the shapes, not by the mesh or the baker's
+// oracle.
+namespace sqmap::bake {
+namespace {
+
+using std::numbers::pi;
+
+/// What must come of one shape. `depth_m` is below zero in the material, and nowhere farther from zero than
+/// the surface is from the point. NaN: the point is not judged.
+struct Shape {
+  std::string name;
+  Mesh mesh;
+  std::function<double(const Vec3d&)> depth_m;
+  double volume_m3;
+  std::size_t least_parts = 1, most_parts = 1;
+  double most_union;                       ///< volume of the union of the superquadrics / volume_m3
+  double most_wrong = 0.01;                ///< depth of a point that is told the wrong side / R_max
+  std::vector<Vec3d> inside_m, outside_m;  ///< points to ask about
+};
+
+double box_depth_m(const Vec3d& p, const Vec3d& half_m, const Vec3d& centre_m = {}) {
+  const Vec3d d = p - centre_m;
+  return std::max({std::abs(d.x) - half_m.x, std::abs(d.y) - half_m.y, std::abs(d.z) - half_m.z});
+}
+
+constexpr double kCoil_m = 1, kWire_m = 0.2, kPitch_m = 0.8, kTurns = 2;
+
+Vec3d helix_m(double turn_rad) {
+  return {kCoil_m * std::cos(turn_rad), kCoil_m * std::sin(turn_rad), kPitch_m * turn_rad / (2 * pi)};
+}
+
+/// Distance to the wire round the helix. Near its flat ends the point is not judged.
+double spring_depth_m(const Vec3d& p) {
+  constexpr int kSteps = 720;
+  double least_m = 1e9;
+  for (int i = 0; i <= kSteps; ++i)
+    least_m = std::min(least_m, norm(p - helix_m(2 * pi * kTurns * i / kSteps)));
+  for (const double end_rad : {0.0, 2 * pi * kTurns})
+    if (norm(p - helix_m(end_rad)) < 2 * kWire_m) return std::nan("");
+  return least_m - kWire_m;
+}
+
+std::vector<Shape> make_shapes() {
+  std::vector<Shape> shapes;
+  shapes.push_back({.name = "cube",
+                    .mesh = test::box({0.5, 0.5, 0.5}),
+                    .depth_m =
+                        [](const Vec3d& p) {
+                          return box_depth_m(p, {0.5, 0.5, 0.5});
+                        },
+                    .volume_m3 = 1,
+                    .most_union = 1.3,
+                    .inside_m = {{}, {0.49, 0, 0}, {0.49, 0.49, 0.49}, {-0.49, 0.49, -0.49}},
+                    .outside_m = {{0.51, 0, 0}, {0.51, 0.51, 0.51}, {0, -0.52, 0.4}}});
+  shapes.push_back({.name = "sphere",
+                    .mesh = test::sphere(1, 4),
+                    .depth_m = [](const Vec3d& p) { return norm(p) - 1; },
+                    .volume_m3 = 4 * pi / 3,
+                    .most_union = 1.02,
+                    .inside_m = {{}, {0.98, 0, 0}, {0, 0, -0.98}, {0.56, 0.56, 0.56}},
+                    .outside_m = {{1.02, 0, 0}, {0, 0, -1.02}, {0.6, 0.6, 0.6}}});
+  shapes.push_back(
+      {.name = "cylinder",
+       .mesh = test::cylinder(0.5, 1, 96),
+       .depth_m = [](const Vec3d& p) { return std::max(std::hypot(p.x, p.y) - 0.5, std::abs(p.z) - 1); },
+       .volume_m3 = pi / 2,
+       .most_union = 1.25,
+       .inside_m = {{}, {0.47, 0, 0.97}, {0, 0, -0.98}, {0.34, 0.34, 0}},
+       .outside_m = {{0.53, 0, 0}, {0, 0, 1.03}, {0.37, 0.37, 0.5}}});
+  shapes.push_back({.name = "cone",
+                    .mesh = test::cone(0.5, 1, 96),
+                    .depth_m =
+                        [](const Vec3d& p) {
+                          return std::max(-p.z,
+                                          (std::hypot(p.x, p.y) - 0.5 * (1 - p.z)) / std::hypot(1.0, 0.5));
+                        },
+                    .volume_m3 = pi / 12,
+                    .most_parts = 8,
+                    .most_union = 3.6,
+                    .inside_m = {{0, 0, 0.03}, {0.4, 0, 0.05}, {0, 0, 0.9}, {0, 0.2, 0.5}},
+                    .outside_m = {{0, 0, -0.03}, {0, 0, 1.03}, {0.3, 0, 0.5}, {0.5, 0, 0.1}}});
+  shapes.push_back(
+      {.name = "l_shape",
+       .mesh = test::l_shape(2, 0.5),
+       .depth_m =
+           [](const Vec3d& p) {
+             return std::min(box_depth_m(p, {1, 0.25, 0.25}, {1, 0.25, 0}),
+                             box_depth_m(p, {0.25, 1, 0.25}, {0.25, 1, 0}));
+           },
+       .volume_m3 = 0.875,
+       .least_parts = 2,
+       .most_parts = 4,
+       .most_union = 1.4,
+       .inside_m = {{0.1, 0.1, 0}, {1.95, 0.25, 0}, {0.25, 1.95, 0}, {0.45, 0.45, 0.2}, {1, 0.47, 0}},
+       .outside_m = {{0.55, 0.55, 0}, {1, 0.55, 0}, {2.05, 0.25, 0}, {0.25, 1, 0.3}}});
+  shapes.push_back(
+      {.name = "torus",
+       .mesh = test::torus(1, 0.3, 64, 32),
+       .depth_m = [](const Vec3d& p) { return std::hypot(std::hypot(p.x, p.y) - 1, p.z) - 0.3; },
+       .volume_m3 = 2 * pi * pi * 0.09,
+       .least_parts = 2,
+       .most_parts = 8,
+       .most_union = 1.9,
+       .inside_m = {{1, 0, 0}, {-1, 0, 0.27}, {0, 0.73, 0}, {0, -1.27, 0}, {0.707, 0.707, -0.27}},
+       .outside_m = {{}, {0, 0, 0.1}, {0.66, 0, 0}, {0, 1.34, 0}, {-1, 0, 0.34}}});
+  shapes.push_back(
+      {.name = "spring",
+       .mesh = test::spring(kCoil_m, kWire_m, kPitch_m, kTurns, 40, 32),
+       .depth_m = spring_depth_m,
+       .volume_m3 = pi * kWire_m * kWire_m * kTurns * std::hypot(2 * pi * kCoil_m, kPitch_m),
+       .least_parts = 8,
+       .most_parts = 16,
+       .most_union = 2,
+       .inside_m = {helix_m(pi / 2), helix_m(pi), helix_m(2 * pi), helix_m(3 * pi), helix_m(3.4 * pi)},
+       .outside_m = {
+           {0, 0, 0.8}, {1, 0, 0.4}, helix_m(pi) + Vec3d{0, 0, 0.4}, helix_m(2 * pi) + Vec3d{0.25, 0, 0}}});
+  shapes.push_back({.name = "thin_sheet",
+                    .mesh = test::thin_sheet(1, 0.02),
+                    .depth_m =
+                        [](const Vec3d& p) {
+                          return box_depth_m(p, {0.5, 0.5, 0.01});
+                        },
+                    .volume_m3 = 0.02,
+                    .most_union = 1.4,
+                    .most_wrong = 0.02,  // its rim is as high as two texels
+                    .inside_m = {{}, {0.45, 0.45, 0}, {-0.3, 0.1, 0.004}, {0.2, -0.4, -0.004}},
+                    .outside_m = {{0, 0, 0.02}, {0, 0.3, -0.02}, {0.55, 0, 0}}});
+  shapes.push_back(
+      {.name = "hollow_box",
+       .mesh = test::hollow_box({1, 1, 1}, 0.25),
+       .depth_m =
+           [](const Vec3d& p) {
+             return std::max(box_depth_m(p, {1, 1, 1}), -box_depth_m(p, {0.75, 0.75, 0.75}));
+           },
+       .volume_m3 = 8 - 3.375,
+       .most_parts = 8,
+       .most_union = 2.2,
+       .inside_m = {{0.87, 0, 0}, {0, -0.87, 0.3}, {0, 0, 0.87}, {0.9, 0.9, 0.9}, {-0.87, 0.7, -0.7}},
+       .outside_m = {{}, {0.6, 0, 0}, {0.6, -0.6, 0.6}, {0, 0, -0.7}, {1.1, 0, 0}}});
+  shapes.push_back(
+      {.name = "nested_shells",
+       .mesh = test::joined({test::sphere(1, 4), test::flipped(test::sphere(0.7, 4)), test::sphere(0.4, 4)}),
+       .depth_m =
+           [](const Vec3d& p) { return std::min(std::max(norm(p) - 1, 0.7 - norm(p)), norm(p) - 0.4); },
+       .volume_m3 = 4 * pi / 3 * (1 - 0.343 + 0.064),
+       .least_parts = 3,
+       .most_parts = 3,
+       .most_union = 1.5,
+       .inside_m = {{}, {0.3, 0.1, 0}, {0, 0.85, 0}, {0, 0, -0.95}, {0.5, 0.5, 0.5}},
+       .outside_m = {{0.55, 0, 0}, {0, -0.6, 0}, {0.3, 0.3, 0.35}, {1.05, 0, 0}}});
+  shapes.push_back(
+      {.name = "touching_boxes",
+       .mesh =
+           test::joined({test::box({0.5, 0.5, 0.5}, {-0.5, 0, 0}), test::box({0.5, 0.5, 0.5}, {0.5, 0, 0})}),
+       .depth_m =
+           [](const Vec3d& p) {
+             return box_depth_m(p, {1, 0.5, 0.5});
+           },
+       .volume_m3 = 2,
+       .most_parts = 2,
+       .most_union = 1.3,
+       .inside_m = {{-0.02, 0, 0}, {0.02, 0.3, -0.3}, {0.97, 0.4, 0.4}, {-0.97, 0, -0.4}, {0.5, 0, 0}},
+       .outside_m = {{1.03, 0, 0}, {-1.03, 0, 0}, {0, 0.53, 0}, {0, 0, -0.53}}});
+  return shapes;
+}
+
+const std::vector<Shape>& all_shapes() {
+  static const std::vector<Shape> shapes = make_shapes();
+  return shapes;
+}
+
+/// Barr's function, as he wrote it.
+bool holds(const Part& part, const Vec3d& p_m) {
+  const Vec3d local_m =
+      rotation(part.object_from_part.orientation).apply_inverse(p_m - part.object_from_part.translation_m);
+  const Vec3d& semi_axes_m = part.shape.semi_axes_m;
+  const double e1 = part.shape.e1, e2 = part.shape.e2;
+  const double x = std::abs(local_m.x / semi_axes_m.x), y = std::abs(local_m.y / semi_axes_m.y);
+  const double z = std::abs(local_m.z / semi_axes_m.z);
+  return std::pow(std::pow(x, 2 / e2) + std::pow(y, 2 / e2), e2 / e1) + std::pow(z, 2 / e1) <= 1;
+}
+
+bool any_holds(const Asset& asset, const Vec3d& p_m) {
+  return std::ranges::any_of(asset.parts, [&](const Part& part) { return holds(part, p_m); });
+}
+
+class SimpleShape : public testing::TestWithParam<int> {};
+
+TEST_P(SimpleShape, StaysExact) {
+  const Shape& shape = all_shapes()[static_cast<std::size_t>(GetParam())];
+  BakeOptions options;
+  options.sample_count = 2000;
+  const auto baked = bake(test::as_source(shape.mesh), options);
+  ASSERT_TRUE(baked.ok()) << baked.error().finding;
+  const Asset& asset = baked.value().asset;
+  const auto object = runtime::Object::build(asset);
+  ASSERT_TRUE(object.ok()) << object.error().finding;
+
+  EXPECT_GE(asset.parts.size(), shape.least_parts);
+  EXPECT_LE(asset.parts.size(), shape.most_parts);
+  EXPECT_NEAR(asset.mesh.volume_m3, shape.volume_m3, 0.015 * shape.volume_m3);
+  for (const Vec3d& p_m : shape.mesh.vertices_m) ASSERT_TRUE(any_holds(asset, p_m));
+  for (const Vec3d& p_m : shape.inside_m)
+    EXPECT_TRUE(object.value().query(cast<float>(p_m)).inside) << p_m.x << " " << p_m.y << " " << p_m.z;
+  for (const Vec3d& p_m : shape.outside_m)
+    EXPECT_FALSE(object.value().query(cast<float>(p_m)).inside) << p_m.x << " " << p_m.y << " " << p_m.z;
+
+  std::mt19937_64 random(11);
+  std::uniform_real_distribution<double> unit(-1, 1);
+  const auto random_point_m = [&](const Vec3d& half_m) {
+    return Vec3d{half_m.x * unit(random), half_m.y * unit(random), half_m.z * unit(random)};
+  };
+  constexpr int kPoints = 20000;
+  const double reach_m = asset.sphere.radius_m;
+  int in_union = 0;
+  for (int i = 0; i < kPoints; ++i)
+    in_union += any_holds(asset, asset.sphere.centre_m + random_point_m({reach_m, reach_m, reach_m}));
+  EXPECT_LE(8 * reach_m * reach_m * reach_m * in_union / kPoints, shape.most_union * shape.volume_m3);
+
+  Vec3d low_m = shape.mesh.vertices_m[0], high_m = low_m;
+  for (const Vec3d& p_m : shape.mesh.vertices_m)
+    for (int axis = 0; axis < 3; ++axis) {
+      low_m[axis] = std::min(low_m[axis], p_m[axis]);
+      high_m[axis] = std::max(high_m[axis], p_m[axis]);
+    }
+  int told = 0, truly = 0;
+  double worst_m = 0;
+  for (int i = 0; i < kPoints; ++i) {
+    const Vec3f p = cast<float>(0.5 * (low_m + high_m) + random_point_m(0.55 * (high_m - low_m)));
+    const double depth_m = shape.depth_m(cast<double>(p));
+    if (std::isnan(depth_m)) continue;
+    const bool is_inside = object.value().query(p).inside;
+    told += is_inside;
+    truly += depth_m < 0;
+    if (is_inside != (depth_m < 0)) worst_m = std::max(worst_m, std::abs(depth_m));
+  }
+  EXPECT_GE(truly, 100);
+  EXPECT_NEAR(told, truly, 0.015 * truly);
+  EXPECT_LE(worst_m, shape.most_wrong * asset.r_max_m);
+}
+
+INSTANTIATE_TEST_SUITE_P(Bake, SimpleShape, testing::Range(0, static_cast<int>(all_shapes().size())),
+                         [](const auto& shape) {
+                           return all_shapes()[static_cast<std::size_t>(shape.param)].name;
+                         });
+
+}  // namespace
+}  // namespace sqmap::bake
