@@ -20,6 +20,7 @@
 #include "part_builder.hpp"
 #include "partition.hpp"
 #include "refine.hpp"
+#include "segment_limit.hpp"
 
 namespace sqmap::bake {
 
@@ -260,6 +261,7 @@ Result<BakeResult> bake(const SourceMesh& source, const BakeOptions& asked, cons
   stages.begin("decompose");
   auto segments = decompose(prepared, options.decompose, progress);
   if (!segments) return segments.error();
+  join_to_limit(prepared.mesh, options.max_parts, segments.value());
 
   stages.begin("refine");
   const Mesh fine = fine_mesh(prepared.mesh, kLongestEdge * r_max_m);

@@ -220,6 +220,27 @@ TEST(Bake, BetterQualityHasLessErrorAndMoreBytes) {
   }
 }
 
+TEST(Bake, KeepsToTheNumberOfPartsWhateverTheNumberOfComponents) {
+  // Two far rows of balls, more than are compared with each other: a part may hold many, but not of both
+  // rows.
+  Mesh balls;
+  for (int i = 0; i < 1200; ++i) {
+    const Mesh ball = test::sphere(0.3, 0);
+    const auto first = static_cast<std::uint32_t>(balls.vertices_m.size());
+    const Vec3d centre{static_cast<double>(i / 2), i % 2 == 0 ? 0.0 : 5000.0, 0};
+    for (const Vec3d& p : ball.vertices_m) balls.vertices_m.push_back(p + centre);
+    for (const auto& f : ball.faces) balls.faces.push_back({first + f[0], first + f[1], first + f[2]});
+  }
+  BakeOptions options;
+  options.set(Quality::kDraft);
+  options.max_parts = 5;
+  options.sample_count = 1000;
+  auto result = bake(test::as_source(balls), options);
+  ASSERT_TRUE(result.ok()) << result.error().finding;
+  EXPECT_LE(result.value().asset.parts.size(), 5U);
+  for (const Part& part : result.value().asset.parts) EXPECT_LT(part.sphere.radius_m, 1500);
+}
+
 TEST(Bake, KeepsToTheByteBudgetAndSaysSo) {
   BakeOptions options = quick_options();
   options.max_error_percent = 0.005;
