@@ -2,6 +2,7 @@
 #include "sqmap/bake/bake.hpp"
 
 #include <cmath>
+#include <numeric>
 #include <random>
 
 #include <gtest/gtest.h>
@@ -231,6 +232,8 @@ TEST(Bake, KeepsToTheNumberOfPartsWhateverTheNumberOfComponents) {
     for (const Vec3d& p : ball.vertices_m) balls.vertices_m.push_back(p + centre);
     for (const auto& f : ball.faces) balls.faces.push_back({first + f[0], first + f[1], first + f[2]});
   }
+  balls.source_face.resize(balls.faces.size());
+  std::iota(balls.source_face.begin(), balls.source_face.end(), 0U);
   BakeOptions options;
   options.set(Quality::kDraft);
   options.max_parts = 5;
