@@ -200,8 +200,9 @@ inline ChartAnswer Chart::look(const Vec3f& p, bool third, std::uint32_t level, 
     }
     // A second sheet behind the first has no patch of its own: its ray distance stands where it is nearer.
     if (!answer.behind_first || refined.distance < answer.distance) answer = refined;
-    // The walk goes downhill only: where the surface is far, another hillside may be nearer.
-    if (std::isfinite(answer.distance) && answer.distance > far_from(part_, stride)) {
+    // The walk goes downhill only: where the surface is far, another hillside may be nearer. Points outside
+    // the mesh, the most of those that touch nothing, do without.
+    if (answer.inside && std::isfinite(answer.distance) && answer.distance > far_from(part_, stride)) {
       const float within = kNearer * answer.distance;
       refined = answer;
       if (nearest_start(p, stride, kElsewhere, within * within, refined.row, refined.col)) {

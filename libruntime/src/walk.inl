@@ -283,7 +283,7 @@ HWY_NOINLINE void Walker::seek(const Lost& lost, const Rings& rings) noexcept {
   }
 }
 
-/// The walk goes downhill only: where the surface is far, another hillside may be nearer.
+/// For points inside: where the surface is far, another hillside may be nearer.
 HWY_NOINLINE void Walker::seek_elsewhere(std::uint32_t begin, std::uint32_t end,
                                          const std::int32_t* asked) noexcept {
   const V far = all(Chart::far_from(part_, looker_.stride()));
@@ -293,7 +293,9 @@ HWY_NOINLINE void Walker::seek_elsewhere(std::uint32_t begin, std::uint32_t end,
     const VI wished = hn::GatherIndex(kDI, asked, hn::LoadU(kDI, entries_.point + i));
     const M wanted = hn::And(hn::FirstN(kD, end - i), as_float(hn::Gt(wished, hn::Zero(kDI))));
     const V distance = hn::LoadU(kD, entries_.distance + i);
-    const M is_far = hn::And(wanted, hn::And(hn::Gt(distance, far), hn::Lt(distance, infinity)));
+    const VI inside = hn::And(hn::LoadU(kDI, entries_.flags + i), all_int(kInside));
+    M is_far = hn::And(wanted, hn::And(hn::Gt(distance, far), hn::Lt(distance, infinity)));
+    is_far = hn::And(is_far, as_float(hn::Ne(inside, hn::Zero(kDI))));
     if (none(is_far)) continue;
     const VI entry = hn::Iota(kDI, static_cast<std::int32_t>(i));
     hn::StoreU(hn::Compress(entry, hn::RebindMask(kDI, is_far)), kDI, far_off.entry + far_off.count);
