@@ -55,17 +55,6 @@ Result<std::vector<std::uint8_t>> read_all(int fd, const std::string& name, std:
   return bytes;
 }
 
-/// 0 or errno.
-int write_all(int fd, std::span<const std::uint8_t> bytes) {
-  while (!bytes.empty()) {
-    const ssize_t count = ::write(fd, bytes.data(), bytes.size());
-    if (count < 0 && errno == EINTR) continue;
-    if (count < 0) return errno;
-    bytes = bytes.subspan(static_cast<std::size_t>(count));
-  }
-  return 0;
-}
-
 template <class Failed>
 Outcome write_through(const std::filesystem::path& path, std::span<const std::uint8_t> bytes, Failed failed) {
   Descriptor file(::open(path.c_str(), O_WRONLY | O_CLOEXEC));
@@ -77,6 +66,16 @@ Outcome write_through(const std::filesystem::path& path, std::span<const std::ui
 }
 
 }  // namespace
+
+int write_all(int fd, std::span<const std::uint8_t> bytes) {
+  while (!bytes.empty()) {
+    const ssize_t count = ::write(fd, bytes.data(), bytes.size());
+    if (count < 0 && errno == EINTR) continue;
+    if (count < 0) return errno;
+    bytes = bytes.subspan(static_cast<std::size_t>(count));
+  }
+  return 0;
+}
 
 Result<std::vector<std::uint8_t>> read_file(const std::filesystem::path& path, std::uint64_t max_bytes) {
   const std::string name = path.string();

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <cstddef>
 
-#include <png.h>
+#include "../common/png_bytes.hpp"
 
 namespace sqmap::apps {
 
@@ -48,21 +48,7 @@ Result<std::vector<std::uint8_t>> map_png(const DistanceMap& map, std::uint32_t 
     }
   }
 
-  png_image image{};
-  image.version = PNG_IMAGE_VERSION;
-  image.width = cols;
-  image.height = rows;
-  image.format = PNG_FORMAT_RGB;
-  const auto refused = [&image] {
-    return Error{Status::kFileUnwritable, std::string("libpng: ") + image.message, ""};
-  };
-  png_alloc_size_t size = 0;
-  if (png_image_write_to_memory(&image, nullptr, &size, 0, pixels.data(), 0, nullptr) == 0) return refused();
-  std::vector<std::uint8_t> bytes(size);
-  if (png_image_write_to_memory(&image, bytes.data(), &size, 0, pixels.data(), 0, nullptr) == 0)
-    return refused();
-  bytes.resize(size);
-  return bytes;
+  return png_bytes(pixels, cols, rows, PixelFormat::kRgb);
 }
 
 }  // namespace sqmap::apps

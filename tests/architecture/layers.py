@@ -65,7 +65,7 @@ THIRD_PARTY = {
     "toml++": (("toml++/",), ["apps/sqbake/toml_files.cpp"]),
     "CLI11, fmt": (("CLI/", "fmt/"), ["apps/*.cpp"]),
     "Bullet": (("Bullet", "LinearMath/", "btBullet"), ["apps/sqsim/cloth.cpp", "apps/sqbench/peer_gimpact.cpp"]),
-    "libpng": (("png.h",), ["apps/sqbake/report/part_picture.cpp", "apps/sqinfo/map_image.cpp"]),
+    "libpng": (("png.h",), ["apps/common/png_bytes.cpp"]),
     "RapidCheck": (("rapidcheck/",), ["tests/runtime/property_test.cpp", "tests/hard/property_test.cpp"]),
     "GoogleTest": (("gtest/", "gmock/"), ["tests/*_test.cpp"]),
 }

@@ -104,16 +104,6 @@ std::string temporary_name() {
   return fmt::format("{}{}-{}-{}.tmp", kTemporaryPrefix, host.data(), ::getpid(), counter++);
 }
 
-int write_all(int fd, std::span<const std::uint8_t> bytes) {
-  while (!bytes.empty()) {
-    const ssize_t count = ::write(fd, bytes.data(), bytes.size());
-    if (count < 0 && errno == EINTR) continue;
-    if (count < 0) return errno;
-    bytes = bytes.subspan(static_cast<std::size_t>(count));
-  }
-  return 0;
-}
-
 }  // namespace
 
 Outcome replace_file(const fs::path& path, std::span<const std::uint8_t> bytes, bool sync) {

@@ -7,10 +7,9 @@
 #include <limits>
 #include <string>
 
-#include <png.h>
-
 #include "../../common/glb_writer.hpp"
 #include "../../common/part_surface.hpp"
+#include "../../common/png_bytes.hpp"
 
 namespace sqmap::apps {
 namespace {
@@ -155,21 +154,7 @@ Result<std::vector<std::uint8_t>> part_picture(const Asset& asset, std::uint32_t
     }
   }
 
-  png_image image{};
-  image.version = PNG_IMAGE_VERSION;
-  image.width = 2 * side;
-  image.height = side;
-  image.format = PNG_FORMAT_RGBA;
-  const auto refused = [&image] {
-    return Error{Status::kFileUnwritable, std::string("libpng: ") + image.message, ""};
-  };
-  png_alloc_size_t size = 0;
-  if (png_image_write_to_memory(&image, nullptr, &size, 0, pixels.data(), 0, nullptr) == 0) return refused();
-  std::vector<std::uint8_t> bytes(size);
-  if (png_image_write_to_memory(&image, bytes.data(), &size, 0, pixels.data(), 0, nullptr) == 0)
-    return refused();
-  bytes.resize(size);
-  return bytes;
+  return png_bytes(pixels, 2 * side, side, PixelFormat::kRgba);
 }
 
 }  // namespace sqmap::apps
