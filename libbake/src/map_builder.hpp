@@ -35,8 +35,7 @@ struct MeshQueries {
   const OpenPlaces& open;
 
   /// Winding number of the mesh at p, rounded. `line_hits`: the crossings of the line through p along the
-  /// unit vector `direction`, t_m = 0 at
-  /// p; where the mesh is closed they tell it at once.
+  /// unit vector `direction`, t_m = 0 at p; where the mesh is closed they tell it at once.
   int winding(const Vec3d& p_m, const Vec3d& direction, const std::vector<RayTracer::Hit>& line_hits) const;
   /// Negative inside [m].
   double signed_distance(const Vec3d& p_m) const;
