@@ -159,10 +159,10 @@ Candidate optimise(const Hull& hull, const FitOptions& options) {
       iterations += exact.iterations;
       if (mean_gap(exact.at, hull.vertices) < kOnSurface &&
           inflated(exact.at, hull.vertices) < smallest + kUnsampled)
-        return {exact.at, iterations};
+        return {exact.at, iterations, exact.stop};
     }
   }
-  return {best.at, iterations};
+  return {best.at, iterations, best.stop};
 }
 
 double max_abs(const Vec3d& v) { return std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)}); }
@@ -268,6 +268,7 @@ Result<Fit> fit_superquadric(std::span<const Vec3d> points_m, const FitOptions& 
   const Candidate found = optimise(hull, options);
 
   result.iterations = found.iterations;
+  result.stop = found.stop;
   result.shape = found.at.shape;
   Vec3d& axes = result.shape.semi_axes_m;
   const double smallest_axis = options.min_axis_ratio * std::max({axes.x, axes.y, axes.z});

@@ -3,6 +3,8 @@
 
 #include <span>
 
+#include "sqmap/bake/fit.hpp"
+
 #include "fit_model.hpp"
 
 namespace sqmap::bake::fit {
@@ -11,6 +13,7 @@ namespace sqmap::bake::fit {
 struct Candidate {
   Placed at;
   int iterations{};
+  FitStop stop{};  ///< of the last run
 };
 
 /// Levenberg-Marquardt (Ceres) on the residuals of paper eq. (3), the root inside: sqrt(a1 a2 a3) (beta^2 -

@@ -78,6 +78,9 @@ void solve_surface(Candidate& candidate, std::span<const Vec3d> points, const Bo
   ceres::Solver::Summary summary;
   ceres::Solve(options, &problem, &summary);
   candidate.iterations += static_cast<int>(summary.iterations.size());
+  candidate.stop = summary.termination_type == ceres::CONVERGENCE      ? FitStop::kGain
+                   : summary.termination_type == ceres::NO_CONVERGENCE ? FitStop::kIterations
+                                                                       : FitStop::kNoDescent;
   if (x.allFinite()) candidate.at = placed(x, candidate.at.part_axes);
 }
 

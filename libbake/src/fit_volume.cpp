@@ -82,14 +82,16 @@ Vector damped_step(const Objective& model, const Vector& x, const Bounds& bounds
   return hessian.ldlt().solve(descent);
 }
 
-int minimise(Vector& x, InflatedVolume& objective, const Bounds& bounds, int max_iterations) {
+/// Adds to `iterations`.
+FitStop minimise(Vector& x, InflatedVolume& objective, const Bounds& bounds, int max_iterations,
+                 int& iterations) {
   constexpr double kGain = 1e-6;  // of the log-volume: further steps would not show in a part
   constexpr double kMaxDamping = 1e8;
   double damping = 1e-2;
   Objective model = objective.with_derivatives(x);
-  int iteration = 0;
-  while (iteration < max_iterations && damping < kMaxDamping) {
-    ++iteration;
+  for (int k = 0; k < max_iterations; ++k) {
+    if (damping >= kMaxDamping) return FitStop::kNoDescent;
+    ++iterations;
     const Vector next =
         (x + damped_step(model, x, bounds, damping)).cwiseMax(bounds.lower).cwiseMin(bounds.upper);
     const double gain = next.allFinite() ? model.value - objective.value(next) : -1;
@@ -99,10 +101,10 @@ int minimise(Vector& x, InflatedVolume& objective, const Bounds& bounds, int max
     }
     x = next;
     damping = std::max(damping / 5, 1e-6);
-    if (gain < kGain) break;
+    if (gain < kGain) return FitStop::kGain;
     model = objective.with_derivatives(x);
   }
-  return iteration;
+  return damping < kMaxDamping ? FitStop::kIterations : FitStop::kNoDescent;
 }
 
 }  // namespace
@@ -112,7 +114,7 @@ void solve_volume(Candidate& candidate, std::span<const Vec3d> points, const Bou
   for (double p = first_p; p <= last_p; p *= 4) {
     Vector x = parameters(candidate.at).cwiseMax(bounds.lower).cwiseMin(bounds.upper);
     InflatedVolume objective(points, candidate.at.part_axes, p);
-    candidate.iterations += minimise(x, objective, bounds, max_iterations);
+    candidate.stop = minimise(x, objective, bounds, max_iterations, candidate.iterations);
     candidate.at = placed(x, candidate.at.part_axes);
   }
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <cstdint>
 #include <span>
 
 #include "sqmap/asset/result.hpp"
@@ -24,6 +25,14 @@ struct FitOptions {
   Outcome check() const;
 };
 
+/// Why the optimisation run that gave the shape ended.
+enum class FitStop : std::uint8_t {
+  kPoint,       ///< there was none: the points count as one
+  kGain,        ///< a step no longer lowered the logarithm of the volume by 1e-6
+  kNoDescent,   ///< no step, however short, lowered it
+  kIterations,  ///< FitOptions::max_iterations
+};
+
 struct Fit {
   Superquadric shape;  ///< of fits within 2 % of volume, the one whose longest semi-axis is a3
   Pose object_from_part;
@@ -31,6 +40,7 @@ struct Fit {
   double hull_volume_m3{};  ///< of the convex hull of the points; 0 when degenerate
   double mean_residual{};   ///< mean |beta^2 - 1| over the hull vertices [-], how snug the bound is
   int iterations{};         ///< of all runs together
+  FitStop stop{};
 };
 
 /// The smallest bounding superquadric found for the points: beta(p) <= 1 for every one of them, without
