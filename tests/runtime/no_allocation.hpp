@@ -32,9 +32,10 @@ inline void* allocate(std::size_t size) {
 
 }  // namespace sqmap::test
 
-void* operator new(std::size_t size) { return sqmap::test::allocate(size); }
-void* operator new[](std::size_t size) { return sqmap::test::allocate(size); }
-void operator delete(void* memory) noexcept { std::free(memory); }
-void operator delete[](void* memory) noexcept { std::free(memory); }
-void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
-void operator delete[](void* memory, std::size_t) noexcept { std::free(memory); }
+// Not inlined: GCC would see free() called for what it knows to come from operator new, and warn.
+[[gnu::noinline]] void* operator new(std::size_t size) { return sqmap::test::allocate(size); }
+[[gnu::noinline]] void* operator new[](std::size_t size) { return sqmap::test::allocate(size); }
+[[gnu::noinline]] void operator delete(void* memory) noexcept { std::free(memory); }
+[[gnu::noinline]] void operator delete[](void* memory) noexcept { std::free(memory); }
+[[gnu::noinline]] void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
+[[gnu::noinline]] void operator delete[](void* memory, std::size_t) noexcept { std::free(memory); }
