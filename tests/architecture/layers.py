@@ -55,7 +55,7 @@ THIRD_PARTY = {
     "Highway": (("hwy/",), ["apps/sqbench/grid_kernels.cpp", "libruntime/src/engine.cpp"]),
     "FCL": (("fcl/",), ["apps/sqbench/peer_fcl.cpp"]),
     "TBB": (("tbb/", "oneapi/"), ["libbake/src/*.cpp", "apps/sqbake/worker_pool.cpp",
-                                  "tests/bake/decompose_test.cpp"]),
+                                  "tests/bake/decompose_test.cpp", "tests/bake/fit_stress.cpp"]),
     "HDF5": (("hdf5", "H5"), ["formats/src/hdf5_handle.cpp", "formats/src/writer.cpp",
                               "tests/formats/hostile_test.cpp"]),
     "zlib": (("zlib.h",), ["formats/src/chunk.cpp", "tests/formats/hostile_test.cpp"]),

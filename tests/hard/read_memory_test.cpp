@@ -31,6 +31,8 @@ void discounted(void* memory) noexcept {
 
 void* operator new(std::size_t size) { return counted(size); }
 void* operator new[](std::size_t size) { return counted(size); }
+void* operator new(std::size_t size, const std::nothrow_t&) noexcept { return counted(size); }
+void* operator new[](std::size_t size, const std::nothrow_t&) noexcept { return counted(size); }
 void operator delete(void* memory) noexcept { discounted(memory); }
 void operator delete[](void* memory) noexcept { discounted(memory); }
 void operator delete(void* memory, std::size_t) noexcept { discounted(memory); }
