@@ -28,8 +28,9 @@ struct ChartAnswer {
   Vec3f surface;                               ///< nearest point found on it
   Vec3f normal;                                ///< outward unit normal there
   float row{}, col{};                          ///< where on the map
-  bool behind_first{};                         ///< layer 2: the nearest crossing is not the first of its ray
+  bool has_point{};                            ///< layer 2: the distance is to a crossing that is on no patch
   bool leaving{};                              ///< layer 2: the ray leaves the material there
+  bool bounds_patch{};                         ///< layer 2: the cell of the foot bounds a surface patch
   float offset{};      ///< delta of QueryOptions::edge_length_m; 0 on flat and hollow surface
   bool faces_patch{};  ///< layer 3: the nearest point lies within the represented surface, not on its rim
 };
@@ -133,7 +134,7 @@ class Chart {
     const SurfaceSample<float> r = table_.sample(row, col);
     return r.point_m - depth * r.normal;
   }
-  ChartAnswer second_layer(const Foot<float>& foot, std::uint32_t stride) const noexcept;
+  ChartAnswer second_layer(const Vec3f& p, const Foot<float>& foot, std::uint32_t stride) const noexcept;
   /// Gauss-Newton from (row, col), towards the point of the patch where `error` = p - patch.point is normal
   /// to it.
   void step_towards(const Patch& patch, const Vec3f& error, std::uint32_t stride, float& d_row,
@@ -189,17 +190,17 @@ inline Chart::Patch Chart::patch_at(const Cell& cell, float row, float col,
 inline ChartAnswer Chart::look(const Vec3f& p, bool third, std::uint32_t level, float edge) const noexcept {
   const std::uint32_t stride = part_.stride_at(level);
   const Foot<float> foot = table_.foot(p);
-  ChartAnswer answer = second_layer(foot, stride);
+  ChartAnswer answer = second_layer(p, foot, stride);
   if (third) {
     ChartAnswer refined = answer;
     // An inner point needs a distance, or it would feel no force.
-    if (std::isfinite(answer.distance) ||
+    if (answer.bounds_patch ||
         (answer.inside && nearest_start(p, stride, kBeside, std::numeric_limits<float>::infinity(),
                                         refined.row, refined.col))) {
       third_layer(p, stride, refined);
     }
-    // A second sheet behind the first has no patch of its own: its ray distance stands where it is nearer.
-    if (!answer.behind_first || refined.distance < answer.distance) answer = refined;
+    // A crossing that is on no patch stands where it is nearer.
+    if (!answer.has_point || refined.distance < answer.distance) answer = refined;
     // The walk goes downhill only: where the surface is far, another hillside may be nearer. Points outside
     // the mesh, the most of those that touch nothing, do without.
     if (answer.inside && std::isfinite(answer.distance) && answer.distance > far_from(part_, stride)) {
@@ -248,7 +249,8 @@ inline float Chart::convex_curvature(float row, float col, std::uint32_t stride)
   return most;
 }
 
-inline ChartAnswer Chart::second_layer(const Foot<float>& foot, std::uint32_t stride) const noexcept {
+inline ChartAnswer Chart::second_layer(const Vec3f& p, const Foot<float>& foot,
+                                       std::uint32_t stride) const noexcept {
   const Cell cell = cell_at(foot.row, foot.col, stride);
   const float inverse = 1.0F / static_cast<float>(stride);
   const float s = (foot.row - static_cast<float>(cell.row)) * inverse;
@@ -274,6 +276,7 @@ inline ChartAnswer Chart::second_layer(const Foot<float>& foot, std::uint32_t st
   ChartAnswer answer;
   answer.row = foot.row;
   answer.col = foot.col;
+  answer.bounds_patch = cell.eligible;
   answer.inside = start;
   float gap = std::numeric_limits<float>::infinity();  // to the nearest crossing
   float crossing = 0;
@@ -283,8 +286,8 @@ inline ChartAnswer Chart::second_layer(const Foot<float>& foot, std::uint32_t st
     if (std::abs(crossing_depth - foot.depth_m) < gap) {
       gap = std::abs(crossing_depth - foot.depth_m);
       crossing = crossing_depth;
-      answer.behind_first = !is_first;
-      answer.leaving = odd;
+      answer.has_point = !is_first;
+      answer.leaving = odd != start;
     }
     odd = !odd;
   };
@@ -299,7 +302,20 @@ inline ChartAnswer Chart::second_layer(const Foot<float>& foot, std::uint32_t st
   // A ray without a crossing is as certain as the shape is large.
   const float reach = one_start ? part_.sphere_radius : greater(foot.depth_m, 0.0F);
   answer.certainty = lesser(gap, reach) / greater(doubt, kLeastDoubt * part_.sphere_radius);
-  if (!cell.eligible) return answer;
+  if (!cell.eligible) {
+    // No patch, but a point of the surface: where the ray of the nearest texel crosses it. An inner point is
+    // no deeper than its distance from there.
+    answer.has_point = answer.inside && gap < std::numeric_limits<float>::infinity();
+    if (!answer.has_point) return answer;
+    answer.row = static_cast<float>(cell.row + (nearest < 2 ? 0 : stride));
+    answer.col = static_cast<float>(cell.col + (nearest % 2 == 0 ? 0 : stride));
+    const SurfaceSample<float> r = table_.sample(answer.row, answer.col);
+    answer.surface = r.point_m - crossing * r.normal;
+    const Vec3f d = p - answer.surface;
+    answer.distance = std::sqrt(dot(d, d));
+    answer.normal = (answer.leaving ? -1.0F : 1.0F) * r.normal;
+    return answer;
+  }
   answer.distance = gap;
   answer.surface = place(foot.row, foot.col, crossing);
   answer.normal = (answer.leaving ? -1.0F : 1.0F) * patch_normal(cell, foot.row, foot.col, stride);

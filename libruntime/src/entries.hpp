@@ -14,7 +14,7 @@ inline constexpr std::uint32_t kMostRanges = 64;  ///< parts with entries at a t
 
 enum EntryFlag : std::int32_t {
   kInside = 1,
-  kBehind = 2,    ///< layer 2: the nearest crossing is not the first of its ray
+  kPoint = 2,     ///< layer 2: the distance is to a crossing that is on no patch
   kLeaving = 4,   ///< layer 2: the ray leaves the material there
   kPatch = 8,     ///< the cell at (row, col) bounds a surface patch
   kFaces = 16,    ///< layer 3: the nearest point is within the patch

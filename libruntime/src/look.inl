@@ -42,10 +42,12 @@ class Looker {
     const Sample r = sample_at(chart_.table(), row, col);
     return r.point - crossing * r.normal;
   }
-  HWY_INLINE V3 normal_at(V row, V col, M leaving) const noexcept {
+  HWY_INLINE V3 normal_at(V row, V col, M leaving, M on_patch) const noexcept {
     VCell cell = cell_at(row, col);
     read(cell);
-    return pick(leaving, all(-1.0F), all(1.0F)) * patch_normal(cell, row, col);
+    const V3 normal =
+        pick(on_patch, patch_normal(cell, row, col), sample_at(chart_.table(), row, col).normal);
+    return pick(leaving, all(-1.0F), all(1.0F)) * normal;
   }
   const Chart& chart() const noexcept { return chart_; }
 
@@ -185,19 +187,32 @@ SQMAP_KERNEL Look Looker::look(const V3& p, M wanted, float reach) const noexcep
       inside = hn::Gt(inside_number, half);
     }
   }
+  Look look;
+  look.row = foot.row;
+  look.col = foot.col;
+  look.crossing = crossing;
+  look.distance = pick(corners.eligible, gap, all(std::numeric_limits<float>::infinity()));
+  // No patch, but a point of the surface: where the ray of the nearest texel crosses it.
+  const M has_point = hn::And(hn::And(wanted, inside), hn::AndNot(corners.eligible, hit));
+  if (!none(has_point)) {
+    const V size = all(size_);
+    const V node_row = to_float(cell.row) + hn::IfThenZeroElse(lower, size);
+    const V node_col = to_float(cell.col) + hn::IfThenZeroElse(left, size);
+    look.row = pick(has_point, node_row, look.row);
+    look.col = pick(has_point, node_col, look.col);
+    const V3 d = p - surface_at(look.row, look.col, crossing);
+    look.distance = pick(has_point, hn::Sqrt(dot3(d, d)), look.distance);
+  }
   const auto flag = [](M mask, std::int32_t bit)
                         HWY_ATTR { return pick(mask, hn::Set(kDI, bit), hn::Zero(kDI)); };
-  Look look;
-  look.flags = hn::Or(hn::Or(flag(inside, kInside), flag(hn::Gt(later, half), kBehind)),
-                      hn::Or(flag(hn::Gt(leaving, half), kLeaving), flag(corners.eligible, kPatch)));
+  const M on_no_patch = hn::Or(has_point, hn::And(corners.eligible, hn::Gt(later, half)));
+  const M leaves = hn::Xor(hn::Gt(leaving, half), as_float(start));
+  look.flags = hn::Or(hn::Or(flag(inside, kInside), flag(on_no_patch, kPoint)),
+                      hn::Or(flag(leaves, kLeaving), flag(corners.eligible, kPatch)));
   if (reach > 0)
     look.flags = hn::Or(look.flags, flag(hn::Lt(all(part_.depth_min) - foot.depth, all(reach)), kWithin));
   const V sure = pick(as_float(mixed), most(foot.depth, zero), all(part_.sphere_radius));
   look.certainty = least(gap, sure) / most(doubt, all(kLeastDoubt * part_.sphere_radius));
-  look.distance = pick(corners.eligible, gap, all(std::numeric_limits<float>::infinity()));
-  look.row = foot.row;
-  look.col = foot.col;
-  look.crossing = crossing;
   return look;
 }
 

@@ -332,8 +332,8 @@ HWY_INLINE void Walker::write(VI entry, M lanes, V row, V col, V on_rim, V dista
                               const V3& normal) noexcept {
   const VI nobody = hn::Set(kDI, kNobody), at = pick(lanes, entry, nobody);
   const VI flags = hn::GatherIndex(kDI, entries_.flags, at);
-  // A second sheet behind the first has no patch of its own: its ray distance stands where it is nearer.
-  M has_rival = as_float(hn::Ne(hn::And(flags, all_int(kBehind)), hn::Zero(kDI)));
+  // A crossing that is on no patch stands where it is nearer.
+  M has_rival = as_float(hn::Ne(hn::And(flags, all_int(kPoint)), hn::Zero(kDI)));
   if (must_be_nearer_) has_rival = lanes;
   VI to = at;
   if (!none(hn::And(lanes, has_rival))) {
