@@ -17,9 +17,11 @@
 #include "map_budget.hpp"
 #include "map_builder.hpp"
 #include "measure.hpp"
+#include "mesh_order.hpp"
 #include "part_builder.hpp"
 #include "partition.hpp"
 #include "refine.hpp"
+#include "repair_steps.hpp"
 #include "segment_limit.hpp"
 
 namespace sqmap::bake {
@@ -246,7 +248,9 @@ Result<BakeResult> bake(const SourceMesh& source, const BakeOptions& asked, cons
   stages.begin("repair");
   auto repaired = check_and_repair(source, asked.repair);
   if (!repaired) return repaired.error();
-  const PreparedMesh& prepared = repaired.value();
+  PreparedMesh& prepared = repaired.value();
+  prepared.mesh = in_own_order(prepared.mesh);
+  prepared.component = label_components(prepared.mesh);
 
   stages.begin("index");
   const Oracle oracle(prepared.mesh);

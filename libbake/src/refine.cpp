@@ -20,20 +20,20 @@ constexpr std::uint32_t kDraftQuadrantCells = 32;
 constexpr std::uint32_t kShellPoints = 4000;
 // Half width of the shell the partition is judged in, and the cap of one point's error, as shares of R_max.
 constexpr double kShellWidth = 0.03;
-constexpr double kWorstError = 0.02;
-// Parts with at least this share of the worst part's error are split in the same round.
-constexpr double kRoundShare = 0.7;
+constexpr double kWorstError = 0.2;
 // The final maps are coarser than the drafts that pieces are judged by, and take the rest of the target.
 constexpr double kRefineShare = 0.7;
 // A split pays if it lowers the error by more than this share of what each part of a full count may err.
 constexpr double kPartPrice = 0.3;
+// So many splits that do not pay are kept on trial, one after another, before the search ends.
+constexpr int kMostTrials = 4;
 
 /// A cell with a quick fit and a draft map, enough to judge it by.
 Result<Piece> draft_piece(const SolidSet& set, Cell cell, const MeshQueries& queries, FitOptions options) {
   options.quick = true;
   auto part = fit_part(set, cell, options);
   if (!part) return part.error();
-  Piece piece{std::move(cell), std::move(part).value(), {}, 0};
+  Piece piece{std::move(cell), std::move(part).value(), {}, 0, {}};
   draft_map(piece.part, queries, kDraftQuadrantCells);
   return piece;
 }
@@ -131,35 +131,60 @@ class Refiner {
     return judge_pieces();
   }
 
-  bool meets_target() const { return std::accumulate(error_m_.begin(), error_m_.end(), 0.0) <= target_m_; }
+  bool meets_target() const { return error_m() <= target_m_; }
 
-  /// Splits the pieces that add most to the error, as far as parts are left, and keeps the splits that pay.
-  /// False: there was none to split.
+  /// Splits the piece that adds most to the error of those with a cut left to try, and keeps the split if it
+  /// pays. False: no piece has one.
   Result<bool> split_worst() {
-    const std::vector<std::size_t> order = worst_pieces();
-    if (order.empty()) return false;
-    std::vector<Split> splits;
-    for (const std::size_t k : order) {
-      if (pieces.size() >= options_.max_parts) break;
-      if (auto outcome = split(k, splits); !outcome) return outcome.error();
-    }
-    if (auto outcome = judge_pieces(); !outcome) return outcome.error();
-    // Halves appended last come off first, so the places of the others stay.
-    for (auto it = splits.rbegin(); it != splits.rend(); ++it) {
-      const double saved_m = it->error_before_m - error_m_[it->first] - error_m_[it->second];
-      if (!(saved_m > kPartPrice * target_m_ / options_.max_parts)) undo(*it);
-    }
+    const std::optional<std::size_t> worst = worst_of([&](Piece& piece) { return can_split(piece); });
+    if (!worst) return false;
+    Piece before = pieces[*worst];
+    const std::vector<double> error_before_m = error_m_;
+    const double sum_before_m = error_m();
+    if (auto outcome = split(*worst, before.cuts_tried); !outcome) return outcome.error();
+    const double saved_m = sum_before_m - error_m();
+    if (saved_m > price_m()) return true;
+    // The whole piece comes back; the next best cut across it will be tried.
+    if (!before.spare || -saved_m < before.spare->loss_m) before.spare = Spare{before.cuts_tried, -saved_m};
+    ++before.cuts_tried;
+    pieces[*worst] = std::move(before);
+    pieces.pop_back();
+    error_m_ = error_before_m;
     return true;
+  }
+
+  /// Where no split pays: splits the worst piece all the same. False: there is none, or it was tried often
+  /// enough.
+  Result<bool> split_on_trial() {
+    if (trials_ == kMostTrials) return false;
+    const std::optional<std::size_t> worst = worst_of([](Piece& piece) { return piece.spare.has_value(); });
+    if (!worst) return false;
+    ++trials_;
+    if (auto outcome = split(*worst, pieces[*worst].spare->cut); !outcome) return outcome.error();
+    return true;
+  }
+
+  void remember_best() {
+    const double cost_m = std::max(error_m(), target_m_) + price_m() * static_cast<double>(pieces.size());
+    if (!(cost_m < least_cost_m_)) return;
+    least_cost_m_ = cost_m;
+    best_pieces_ = pieces;
+    best_error_m_ = error_m_;
+    trials_ = 0;
+  }
+
+  /// Goes back to the best partition there was.
+  void end() {
+    remember_best();
+    pieces = std::move(best_pieces_);
+    error_m_ = std::move(best_error_m_);
   }
 
   std::vector<Piece> pieces;
 
  private:
-  struct Split {
-    std::size_t first, second;  ///< where the halves stand
-    Piece before;
-    double error_before_m;
-  };
+  double error_m() const { return std::accumulate(error_m_.begin(), error_m_.end(), 0.0); }
+  double price_m() const { return kPartPrice * target_m_ / options_.max_parts; }
 
   Outcome judge_pieces() {
     auto judged = judge(pieces, shell_, queries_.mesh.faces.size(), r_max_m_);
@@ -174,43 +199,31 @@ class Refiner {
     return piece.cuts_tried < piece.cuts->size();
   }
 
-  std::vector<std::size_t> worst_pieces() {
+  /// The piece that adds most to the error of those that `may` be split.
+  template <class May>
+  std::optional<std::size_t> worst_of(const May& may) {
     std::vector<std::size_t> order(pieces.size());
     std::iota(order.begin(), order.end(), std::size_t{0});
-    std::sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
-      return error_m_[a] != error_m_[b] ? error_m_[a] > error_m_[b] : a < b;
-    });
-    std::vector<std::size_t> worst;
-    for (const std::size_t k : order) {
-      if (!(error_m_[k] > 0)) break;
-      if (!worst.empty() && error_m_[k] < kRoundShare * error_m_[worst.front()]) break;
-      if (can_split(pieces[k])) worst.push_back(k);
-    }
-    return worst;
+    std::stable_sort(order.begin(), order.end(),
+                     [&](std::size_t a, std::size_t b) { return error_m_[a] > error_m_[b]; });
+    for (const std::size_t k : order)
+      if (error_m_[k] > 0 && may(pieces[k])) return k;
+    return std::nullopt;
   }
 
-  Outcome split(std::size_t k, std::vector<Split>& splits) {
+  /// Puts the halves of piece k in its place and at the end.
+  Outcome split(std::size_t k, std::size_t which) {
     const Cell& whole = pieces[k].cell;
-    const std::vector<bool>& cut = (*pieces[k].cuts)[pieces[k].cuts_tried];
+    const std::vector<bool>& cut = (*pieces[k].cuts)[which];
     Cell first{{}, whole.segment, CutReason::kErrorTarget}, second = first;
     std::tie(first.solid, second.solid) = set_.split(whole.solid, [&](std::size_t t) { return cut[t]; });
     auto a = draft_piece(set_, std::move(first), queries_, options_.fit);
     auto b = draft_piece(set_, std::move(second), queries_, options_.fit);
     if (!a) return a.error();
     if (!b) return b.error();
-    splits.push_back({k, pieces.size(), std::move(pieces[k]), error_m_[k]});
     pieces[k] = std::move(a).value();
     pieces.push_back(std::move(b).value());
-    return Done{};
-  }
-
-  /// Puts the whole piece back; the next best cut across it will be tried.
-  void undo(Split& split) {
-    pieces[split.first] = std::move(split.before);
-    ++pieces[split.first].cuts_tried;
-    error_m_[split.first] = split.error_before_m;
-    pieces.erase(pieces.begin() + static_cast<std::ptrdiff_t>(split.second));
-    error_m_.erase(error_m_.begin() + static_cast<std::ptrdiff_t>(split.second));
+    return judge_pieces();
   }
 
   SolidSet& set_;
@@ -220,6 +233,10 @@ class Refiner {
   double target_m_;  ///< the error that all shell points together may have
   ShellPoints shell_;
   std::vector<double> error_m_;  ///< that each piece adds to the sum over the shell
+  int trials_ = 0;               ///< since the best partition
+  double least_cost_m_ = std::numeric_limits<double>::infinity();
+  std::vector<Piece> best_pieces_;
+  std::vector<double> best_error_m_;
 };
 
 }  // namespace
@@ -232,12 +249,16 @@ Result<Refinement> refine(SolidSet& set, std::vector<Cell> cells, const MeshQuer
   while (can_gain && !refiner.meets_target() && refiner.pieces.size() < options.max_parts) {
     if (progress.stop()) return Error{Status::kCancelled, "cancelled while refining parts", ""};
     progress.at("refine", static_cast<double>(refiner.pieces.size()) / options.max_parts);
+    refiner.remember_best();
     auto split = refiner.split_worst();
+    if (split && !split.value()) split = refiner.split_on_trial();
     if (!split) return split.error();
     can_gain = split.value();
   }
+  refiner.end();
+  const bool is_full = refiner.pieces.size() >= options.max_parts;
   Refinement result{std::move(refiner.pieces), refiner.meets_target() ? "target"
-                                               : can_gain             ? "parts"
+                                               : is_full              ? "parts"
                                                                       : "gain"};
   if (auto outcome = fit_pieces(set, result.pieces, options.fit); !outcome) return outcome.error();
   return result;

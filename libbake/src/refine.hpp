@@ -12,12 +12,19 @@
 
 namespace sqmap::bake {
 
+/// A cut that did not pay.
+struct Spare {
+  std::size_t cut;
+  double loss_m;  ///< by which the error of all parts together rose; negative: fell
+};
+
 /// A cell and the superquadric around it, with a draft map.
 struct Piece {
   Cell cell;
   Part part;
   std::optional<std::vector<std::vector<bool>>> cuts;  ///< planes to split it by, best first
   std::size_t cuts_tried{};                            ///< of them, those that did not pay
+  std::optional<Spare> spare;                          ///< of those, the one that cost least
 };
 
 struct Refinement {
@@ -27,8 +34,9 @@ struct Refinement {
 
 /// Splits the parts that add most to the signed-distance error near the surface, again and again, until the
 /// mean error is within the target, the parts are spent, or no split pays. A split that does not lower the
-/// error is undone: it would cost bytes, and its seam is one more place where rays see little. Errors:
-/// kCancelled, kBakeFailed.
+/// error is undone: it would cost bytes, and its seam is one more place where rays see little. Where nothing
+/// else is left, splits that do not pay are kept on trial, for what their halves may gain; the best partition
+/// on the way is the result. Errors: kCancelled, kBakeFailed.
 Result<Refinement> refine(SolidSet& set, std::vector<Cell> cells, const MeshQueries& queries, double r_max_m,
                           const BakeOptions& options, const Progress& progress);
 

@@ -129,6 +129,20 @@ TEST(Bake, IsTheSameTwice) {
   EXPECT_EQ(first.value().asset.face_labels, second.value().asset.face_labels);
 }
 
+TEST(Bake, DoesNotDependOnTheOrderOfVerticesAndFaces) {
+  // An uneven body: the order must not even decide between equals.
+  Mesh mesh = test::torus(1, 0.3, 48, 24);
+  for (Vec3d& v : mesh.vertices_m)
+    v = {1.3 * v.x + 0.1 * v.y * v.y, v.y + 0.2 * v.z * v.x, v.z - 0.15 * v.x * v.x};
+  auto expected = bake(test::as_source(mesh), quick_options());
+  auto reordered = bake(test::as_source(test::shuffled(mesh, 11)), quick_options());
+  ASSERT_TRUE(expected.ok() && reordered.ok());
+  EXPECT_EQ(expected.value().asset.parts, reordered.value().asset.parts);
+  EXPECT_EQ(expected.value().asset.face_labels, reordered.value().asset.face_labels);
+  EXPECT_EQ(finest(expected.value().asset, 3).depth_mean_percent,
+            finest(reordered.value().asset, 3).depth_mean_percent);
+}
+
 TEST(Bake, ScalesWithTheMesh) {
   for (const double scale : {1e-3, 1e3}) {
     Mesh mesh = test::torus(1, 0.3, 48, 24);
@@ -152,12 +166,23 @@ TEST(Bake, StopsWhenAsked) {
 
 TEST(Bake, UndoesSplitsThatDoNotLowerTheError) {
   BakeOptions options = quick_options();
-  options.max_error_percent = 0.02;  // more than rays from the side of a cone reach
+  options.max_error_percent = 0.008;  // more than drafts of a cone's maps reach, however it is cut
   options.max_parts = 12;
   auto result = bake(test::as_source(test::cone(0.5, 1.0, 64)), options);
   ASSERT_TRUE(result.ok());
   EXPECT_LT(result.value().asset.parts.size(), 12U);
   EXPECT_EQ(result.value().stopped_by, "gain");
+}
+
+TEST(Bake, FindsThePartsBehindASplitThatDoesNotPay) {
+  // Halving a cone raises the error by two thirds; the next cuts of the halves bring it to a half.
+  BakeOptions options = quick_options();
+  options.max_error_percent = 0.02;
+  options.max_parts = 12;
+  auto result = bake(test::as_source(test::cone(0.5, 1.0, 64)), options);
+  ASSERT_TRUE(result.ok());
+  EXPECT_LT(result.value().asset.parts.size(), 12U);
+  EXPECT_EQ(result.value().stopped_by, "target");
 }
 
 TEST(Bake, WritesDownEveryOptionThatDecidesTheBytes) {
