@@ -144,7 +144,7 @@ void csv_lines(const std::string& table, const Json& row, std::string& text) {
   for (const auto& [key, value] : row.items()) {
     if (!value.is_object()) line(key, value);
     if (value.is_object())
-      for (const auto& [part, number] : value.items()) line(key + "." + part, number);
+      for (const auto& [part, number] : value.items()) line(fmt::format("{}.{}", key, part), number);
   }
 }
 

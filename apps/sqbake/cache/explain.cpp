@@ -50,7 +50,7 @@ void flatten(const Json& json, const std::string& path, std::map<std::string, st
     return;
   }
   for (const auto& [name, value] : json.items())
-    flatten(value, path.empty() ? name : path + "." + name, values);
+    flatten(value, path.empty() ? name : fmt::format("{}.{}", path, name), values);
 }
 
 std::map<std::string, std::string> options_of(const std::string& text) {
