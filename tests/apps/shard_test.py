@@ -1,11 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Several machines: shards cover the run once, a merge tells what is missing, and the result is that of one machine.
 
-Slurm itself is played by a stand-in for sbatch that runs the tasks one after the other.
+Slurm itself is played by a stand-in for sbatch that runs the tasks one after the other; tests/slurm has the real one.
 """
 import json
 import os
-import shutil
 import subprocess
 import unittest
 from pathlib import Path
@@ -70,14 +69,14 @@ class Shards(FolderTest):
             self.assert_exit(result, 2)
         self.assertFalse((self.folder / "out").exists())
 
-    def submit(self, lost_task=""):
+    def submit(self, lost_task="", shards=3):
         fake = self.folder / "bin"
         fake.mkdir(exist_ok=True)
         (fake / "sbatch").write_text(STAND_IN, encoding="ascii")
         (fake / "sbatch").chmod(0o755)
         environment = {**os.environ, "PATH": f"{fake}:{BIN}:{os.environ['PATH']}", "LOST_TASK": lost_task,
                        "SLURM_CPUS_PER_TASK": "2"}
-        result = subprocess.run([SLURM / "submit", self.models, self.folder / "farm", "3", *ROUGH], env=environment,
+        result = subprocess.run([SLURM / "submit", self.models, self.folder / "farm", str(shards), *ROUGH], env=environment,
                                 capture_output=True, text=True, timeout=TIMEOUT_S, check=False)
         self.assert_exit(result, 0)
         return result.stdout.strip()
@@ -97,14 +96,14 @@ class Shards(FolderTest):
                          "the second run bakes what the first did not")
         self.assertIn("<table", (records / "report.html").read_text(encoding="utf-8"))
 
-    @unittest.skipUnless(shutil.which("snakemake"), "needs snakemake")
-    def test_the_snakefile_gives_what_one_machine_gives(self):
-        self.bake("serial")
-        subprocess.run(["snakemake", "--snakefile", SLURM / "Snakefile", "--cores", "2", "--quiet", "--config",
-                        f"sqbake={BIN / 'sqbake'}", f"input={self.models}", f"out_dir={self.folder / 'farm'}", "shards=2",
-                        f"options={' '.join(ROUGH)}"], check=True, capture_output=True, cwd=self.folder,
-                       timeout=TIMEOUT_S)
-        self.assertEqual(self.bundles(self.folder / "farm"), self.bundles(self.folder / "serial"))
+    def test_an_earlier_run_in_more_shards_does_not_speak_for_this_one(self):
+        self.assertEqual(self.submit(shards=4), "merge ended with 0")
+        write_off(self.models / "m0.off", sphere(1, 9))
+        self.assertEqual(self.submit(shards=2), "merge ended with 0")
+        records = self.folder / "farm" / "records"
+        self.assertEqual(sorted(p.name for p in records.glob("shard-*.ndjson")), ["shard-1.ndjson", "shard-2.ndjson"])
+        self.assertEqual(self.submit(shards=3, lost_task="3"), "merge ended with 1")
+        self.assertTrue(json.loads((records / "all.ndjson").read_text(encoding="utf-8").splitlines()[-1])["missing"])
 
 
 if __name__ == "__main__":
