@@ -164,7 +164,7 @@ constexpr std::array<Setting, 10> kSettings{{
      default_max_bytes, apply_max_bytes},
     {"timeout", "TIME", "End the bake of a mesh after this time: 90s, 5m, 2h or none", default_timeout,
      apply_timeout},
-    {"memory", "BYTES", "Memory that the bake of a mesh may take, e.g. 2G, or none", default_memory,
+    {"memory", "BYTES", "Memory (heap) that the bake of a mesh may take, e.g. 2G, or none", default_memory,
      apply_memory},
     {"fallback", "KIND",
      "For a mesh that ran into a limit, crashed or could not be baked:\nnone, or superquadric: bake one for "

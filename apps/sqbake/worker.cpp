@@ -53,10 +53,15 @@ std::string read_line() {
   }
 }
 
-/// Private writable memory: heap, stacks and mappings. Not RLIMIT_AS, which also counts libraries and the
-/// address ranges that malloc reserves for each thread without using them.
-bool limit_memory(std::uint64_t bytes) {
-  const rlimit limit{bytes, bytes};
+/// TBB's stack of a thread. Its address range counts for the limit, though a bake touches next to none of it;
+/// so it comes on top, and a mesh needs no more memory where there are more threads.
+constexpr std::uint64_t kThreadStack_bytes = std::uint64_t{4} << 20;
+
+/// Private writable memory: heap and mappings. Not RLIMIT_AS, which also counts libraries and the address
+/// ranges that malloc reserves for each thread without using them.
+bool limit_memory(std::uint64_t bytes, unsigned threads) {
+  const std::uint64_t with_stacks = bytes + threads * kThreadStack_bytes;
+  const rlimit limit{with_stacks, with_stacks};
   return ::setrlimit(RLIMIT_DATA, &limit) == 0;
 }
 
@@ -77,7 +82,8 @@ int run_worker(const char* mesh) {
   if (::getppid() != job.parent_pid)
     return static_cast<int>(Exit::kTerminated);  // it died before the line above
   no_core_dump();
-  if (job.memory_bytes > 0 && !limit_memory(job.memory_bytes)) return static_cast<int>(Exit::kInternal);
+  if (job.memory_bytes > 0 && !limit_memory(job.memory_bytes, job.bake.threads))
+    return static_cast<int>(Exit::kInternal);
   std::set_new_handler(on_exhausted_memory);
   job.bake.input = mesh;
 

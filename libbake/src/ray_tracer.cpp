@@ -119,7 +119,8 @@ void intersect(const RTCIntersectFunctionNArguments* arguments) {
 struct RayTracer::Impl {
   explicit Impl(const Mesh& mesh) : faces(mesh.faces) {
     normalise(mesh);
-    device = rtcNewDevice(nullptr);
+    // Embree would reserve 128 MB for the tessellation of surfaces that are not here.
+    device = rtcNewDevice("tessellation_cache_size=0");
     if (device == nullptr) throw std::bad_alloc();
     scene = rtcNewScene(device);
     rtcSetSceneFlags(scene, RTC_SCENE_FLAG_ROBUST);

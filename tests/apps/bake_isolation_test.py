@@ -110,7 +110,8 @@ class Isolation(FolderTest):
     def test_a_memory_limit_ends_a_bake_and_a_sufficient_one_changes_no_byte(self):
         source = write_off(self.models / "b.off", bent(4, 1))
         tight, ample, free = (self.folder / f"{name}.h5" for name in ("tight", "ample", "free"))
-        result = run("sqbake", "bake", source, "-o", tight, "--memory", "16M", "--format", "ndjson")
+        large = write_off(self.models / "large.off", bent(5, 1))
+        result = run("sqbake", "bake", large, "-o", tight, "--memory", "16M", "-j1", "--format", "ndjson")
         self.assert_exit(result, 8)
         self.assertEqual(records_of(result.stdout)[0]["outcome"], "memory")
         self.assertIn("--memory", result.stderr)
@@ -118,6 +119,13 @@ class Isolation(FolderTest):
         self.assert_exit(run("sqbake", "bake", source, *ROUGH, "-o", ample, "--memory", "2G"), 0)
         self.assert_exit(run("sqbake", "bake", source, *ROUGH, "-o", free), 0)
         self.assertEqual(ample.read_bytes(), free.read_bytes())
+
+    @unittest.skipIf(IS_ASAN, "AddressSanitizer's own maps exceed any limit")
+    def test_a_memory_limit_counts_what_is_used_and_not_the_threads(self):
+        source = write_off(self.models / "box.off", box())
+        for threads in ("-j1", "-j32"):
+            self.assert_exit(run("sqbake", "bake", source, *ROUGH, "-o", self.folder / "box.h5", "--memory", "48M", threads,
+                                 "--no-cache"), 0)
 
     def test_workers_end_with_a_parent_that_is_killed_and_leave_no_file(self):
         write_off(self.models / "a.off", bent(5, 1))
