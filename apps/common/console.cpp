@@ -11,6 +11,8 @@
 #include <sys/ioctl.h>
 #include <unistd.h>
 
+#include "printable.hpp"
+
 namespace sqmap::apps {
 namespace {
 
@@ -32,21 +34,6 @@ std::size_t terminal_width() {
   winsize size{};
   if (ioctl(STDERR_FILENO, TIOCGWINSZ, &size) != 0 || size.ws_col == 0) return 80;
   return size.ws_col;
-}
-
-/// A file name may hold line feeds and escape sequences: they must not forge lines or drive the terminal.
-std::string printable(std::string_view text) {
-  std::string result;
-  result.reserve(text.size());
-  for (const char c : text) {
-    const auto byte = static_cast<unsigned char>(c);
-    if (byte < 0x20 || byte == 0x7F) {
-      result += fmt::format("\\x{:02x}", byte);
-    } else {
-      result += c;
-    }
-  }
-  return result;
 }
 
 }  // namespace
@@ -116,10 +103,32 @@ Exit Console::finish(Exit code) {
   return Exit::kFileAccess;
 }
 
+std::string printable(std::string_view text) {
+  std::string result;
+  result.reserve(text.size());
+  for (const char c : text) {
+    const auto byte = static_cast<unsigned char>(c);
+    if (byte < 0x20 || byte == 0x7F) {
+      result += fmt::format("\\x{:02x}", byte);
+    } else {
+      result += c;
+    }
+  }
+  return result;
+}
+
 std::string message_for(std::string_view file, const Error& error) {
-  std::string message;
-  if (error.finding.find(file) == std::string::npos) message += std::string(file) + ": ";
-  message += error.finding;
+  const std::size_t slash = file.find_last_of('/');
+  const std::string quoted_name =
+      fmt::format("\"{}\"", slash == std::string_view::npos ? file : file.substr(slash + 1));
+  std::string message(file);
+  if (error.finding.starts_with(quoted_name)) {
+    message += error.finding.substr(quoted_name.size());  // readers of bytes know no folder
+  } else if (error.finding.find(file) != std::string::npos) {
+    message = error.finding;
+  } else {
+    message += ": " + error.finding;
+  }
   if (!error.remedy.empty()) message += "; " + error.remedy;
   return message;
 }

@@ -6,6 +6,7 @@
 #include <map>
 #include <memory>
 #include <new>
+#include <sstream>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -24,15 +25,36 @@ namespace {
 const std::map<std::string, When> kWhenNames{
     {"auto", When::kAuto}, {"always", When::kAlways}, {"never", When::kNever}};
 
-/// CLI11 shows --no-cache, a flag that means false, as --no-cache{false}.
+/// The first line of a text.
+std::string first_line(const std::string& text) { return text.substr(0, text.find('\n')); }
+
 class HelpFormatter : public CLI::Formatter {
  public:
+  explicit HelpFormatter(const Program& program) {
+    for (const Command& command : program.commands) summaries_.emplace(command.name, command.summary);
+  }
+
+  /// One line a command, where CLI11 would print its whole description.
+  std::string make_subcommand(const CLI::App* sub) const override {
+    const bool is_nested = sub->get_parent() != nullptr && sub->get_parent()->get_parent() != nullptr;
+    const auto summary = is_nested ? summaries_.end() : summaries_.find(sub->get_name());
+    std::ostringstream line;
+    CLI::detail::format_help(
+        line, sub->get_name(),
+        summary != summaries_.end() ? summary->second : first_line(sub->get_description()), column_width_);
+    return line.str();
+  }
+
+  /// CLI11 shows --no-cache, a flag that means false, as --no-cache{false}.
   std::string make_option_name(const CLI::Option* option, bool is_positional) const override {
     constexpr std::string_view kMark = "{false}";
     std::string name = CLI::Formatter::make_option_name(option, is_positional);
     if (const std::size_t at = name.find(kMark); at != std::string::npos) name.erase(at, kMark.size());
     return name;
   }
+
+ private:
+  std::map<std::string, std::string> summaries_;
 };
 
 std::string command_names(const Program& program) {
@@ -86,8 +108,9 @@ std::string one_line(std::string text) {
 
 Exit parse_and_run(const Program& program, Console& console, int argc, char** argv) {
   if (const char* name = unknown_command(program, argc, argv)) {
-    console.error(fmt::format("unknown command `{}`{}; the commands are {}", name,
-                              did_you_mean(name, names_of(program)), command_names(program)));
+    const std::string guess = did_you_mean(name, names_of(program));
+    console.error(fmt::format("unknown command `{}`{}", name,
+                              guess.empty() ? "; the commands are " + command_names(program) : guess));
     return Exit::kUsage;
   }
   CLI::App app(std::string(program.summary) + "\n\nExamples:\n" + program.examples, program.name);
@@ -95,7 +118,7 @@ Exit parse_and_run(const Program& program, Console& console, int argc, char** ar
                                                 kFormatMajor, kFormatMinor));
   app.require_subcommand(1);
   app.footer(exit_code_table());
-  app.formatter(std::make_shared<HelpFormatter>());
+  app.formatter(std::make_shared<HelpFormatter>(program));
   app.get_formatter()->column_width(34);
 
   When color = When::kAuto;

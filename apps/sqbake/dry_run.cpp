@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "../common/json_text.hpp"
+#include "../common/printable.hpp"
 #include "record_json.hpp"
 
 namespace sqmap::apps {
@@ -28,7 +29,7 @@ std::string plan_text(const Job& job) {
   std::string text = fmt::format("{} -> {}", job.input.string(), job.output.string());
   for (const auto& [name, value] : job.settings)
     if (value.source != kBuiltIn) text += fmt::format(" {}={}", name, value.text);
-  return text + "\n";
+  return printable(text) + "\n";
 }
 
 }  // namespace

@@ -11,6 +11,7 @@
 #include "sqmap/asset/version.hpp"
 
 #include "../common/json_text.hpp"
+#include "../common/printable.hpp"
 #include "record_json.hpp"
 
 namespace sqmap::apps {
@@ -93,6 +94,7 @@ void RecordWriter::add(const BakeRecord& record) {
 
 void RecordWriter::add_text(const BakeRecord& record) {
   if (!record.has_bundle() && (options_.is_single || record.verdict == Verdict::kCancelled)) return;
+  const std::string name = printable(record.name);
   std::string text;
   if (!has_header_) {
     has_header_ = true;
@@ -100,16 +102,14 @@ void RecordWriter::add_text(const BakeRecord& record) {
                         "parts", "segments", "bytes", "eq35 %", "wrong %", "stopped by", "seconds");
   }
   if (!record.has_bundle()) {
-    text += fmt::format("{:<{}} {:>5} {:>8} {:>9} {:>9} {:>9} {:<10} {:>8.2f}\n", record.name,
-                        options_.name_width, "-", "-", "-", "-", "-", verdict_name(record.verdict),
-                        record.seconds);
+    text += fmt::format("{:<{}} {:>5} {:>8} {:>9} {:>9} {:>9} {:<10} {:>8.2f}\n", name, options_.name_width,
+                        "-", "-", "-", "-", "-", verdict_name(record.verdict), record.seconds);
   } else {
     const ErrorRow* row = record.finest();
-    text +=
-        fmt::format("{:<{}} {:>5} {:>8} {:>9} {:>9} {:>9} {:<10} {:>8}\n", record.name, options_.name_width,
-                    record.parts, record.segments, record.bytes, row ? percent(row->eq35_percent) : "-",
-                    row ? percent(row->misclassified_3_percent) : "-", record.stopped_by,
-                    record.is_cached ? "cached" : fmt::format("{:.2f}", record.seconds));
+    text += fmt::format("{:<{}} {:>5} {:>8} {:>9} {:>9} {:>9} {:<10} {:>8}\n", name, options_.name_width,
+                        record.parts, record.segments, record.bytes, row ? percent(row->eq35_percent) : "-",
+                        row ? percent(row->misclassified_3_percent) : "-", record.stopped_by,
+                        record.is_cached ? "cached" : fmt::format("{:.2f}", record.seconds));
   }
   if (options_.profile)
     for (const bake::StageTime& time : record.times)

@@ -42,6 +42,25 @@ class BadInput(FolderTest):
                 self.assertEqual(self.files(), [name])
                 source.unlink()
 
+    def test_a_message_names_the_file_once_and_where_it_is(self):
+        (self.folder / "below").mkdir()
+        source = self.folder / "below" / "short.off"
+        source.write_text(off_text(*box())[:-20], encoding="ascii")
+        for arguments in (("check", source), ("bake", source, "-o", self.folder / "out.h5")):
+            message = run("sqbake", *arguments).stderr
+            self.assertTrue(message.startswith(f"sqbake: error: {source}"), message)
+            self.assertEqual(message.count("short.off"), 1, message)
+
+    def test_a_line_feed_in_a_name_forges_no_line(self):
+        (self.folder / "models").mkdir()
+        (self.folder / "models" / "a\nb.off").write_text("OFF\n", encoding="ascii")
+        (self.folder / "models" / "c.off").write_text("OFF\n", encoding="ascii")
+        result = run("sqbake", "bake", self.folder / "models", "--out-dir", self.folder / "out")
+        self.assertEqual(result.returncode, 1)
+        self.assertEqual([line.split()[0] for line in result.stdout.splitlines()], ["asset", "a\\x0ab.off", "c.off"])
+        dry = run("sqbake", "bake", self.folder / "models", "--out-dir", self.folder / "out", "-n")
+        self.assertEqual(len(dry.stdout.splitlines()), 2, dry.stdout)
+
     def test_a_missing_file_is_a_file_error(self):
         self.check(run("sqbake", "bake", self.folder / "none.off", "-o", self.folder / "out.h5"), "none.off", 3)
         self.check(run("sqbake", "check", self.folder / "none.off"), "none.off", 3)

@@ -34,6 +34,8 @@ class Help(unittest.TestCase):
             text = run(program, "--help").stdout
             for name in names:
                 self.assertRegex(text, rf"(?m)^  {name}\s+\S")
+            listed = text.split("Subcommands:\n")[1].split("\n\n")[0].rstrip().splitlines()
+            self.assertEqual(len(listed), len(names), "one line a command")
 
     def test_version_names_program_and_bundle_format(self):
         for program in COMMANDS:
