@@ -30,6 +30,15 @@ const Field& Model::field(unsigned resolution) const {
   return *slot;
 }
 
+void Model::find_box() {
+  low_m = high_m = mesh.vertices_m.front();
+  for (const Vec3d& v : mesh.vertices_m)
+    for (int axis = 0; axis < 3; ++axis) {
+      low_m[axis] = std::min(low_m[axis], v[axis]);
+      high_m[axis] = std::max(high_m[axis], v[axis]);
+    }
+}
+
 Result<Model> read_model(const std::filesystem::path& mesh, const std::filesystem::path& bundles) {
   Model model;
   model.name = mesh.stem().string();
@@ -52,12 +61,7 @@ Result<Model> read_model(const std::filesystem::path& mesh, const std::filesyste
   if (!prepared) return prepared.error();
   model.mesh = std::move(prepared.value().mesh);
   model.oracle = std::make_unique<bake::Oracle>(model.mesh);
-  model.low_m = model.high_m = model.mesh.vertices_m.front();
-  for (const Vec3d& v : model.mesh.vertices_m)
-    for (int axis = 0; axis < 3; ++axis) {
-      model.low_m[axis] = std::min(model.low_m[axis], v[axis]);
-      model.high_m[axis] = std::max(model.high_m[axis], v[axis]);
-    }
+  model.find_box();
   return model;
 }
 

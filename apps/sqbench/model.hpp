@@ -29,6 +29,9 @@ struct Model {
   /// The exact field at this resolution, computed once and shared by the grids of all codes.
   const Field& field(unsigned resolution) const;
 
+  /// Sets low_m and high_m from the mesh.
+  void find_box();
+
   mutable std::map<unsigned, std::shared_ptr<const Field>> fields;
 };
 

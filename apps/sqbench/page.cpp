@@ -9,6 +9,7 @@
 
 #include <fmt/format.h>
 
+#include "budget_words.hpp"
 #include "paper_words.hpp"
 #include "peer.hpp"
 #include "results.hpp"
@@ -171,6 +172,21 @@ std::string tables(const Results& results) {
                 is_ours(row.peer));
     html += "<h2>Accuracy</h2>\n" + table.html();
   }
+  if (!results.budgets.empty()) {
+    Table table({"model", "method", "budget, KB", "KB resident", "error, %", "depth error, %",
+                 "wrong side, %", "answered, %", "normal, deg", "us a frame", "quartiles"});
+    for (const BudgetRow& row : results.budgets)
+      table.row({row.model, row.peer, number(row.budget_bytes / 1024),
+                 number(static_cast<double>(row.bytes) / 1024), number(row.mean_error_percent),
+                 number(row.depth_error_percent), number(row.wrong_side_percent),
+                 number(row.answered_percent), number(row.normal_mean_deg), number(row.us.median),
+                 number(row.us.lower) + " - " + number(row.us.upper)},
+                is_ours(row.peer));
+    html +=
+        "<h2>Budgets</h2>\n<p>Of each method the finest setting that fits; sqmap is baked for each budget. "
+        "Errors within 1 % of R_max of the surface.</p>\n" +
+        table.html();
+  }
   if (!results.peers.empty()) {
     Table table({"model", "peer", "KB resident", "build, s", "stated error, %", "of"});
     for (const PeerRow& row : results.peers)
@@ -246,11 +262,12 @@ std::string results_page(const Results& results, const std::vector<Picture>& pic
       "<link rel=\"icon\" href=\"data:,\"><style>{}</style></head>\n<body>\n<h1>What accuracy costs in "
       "time</h1>\n",
       kStyle);
-  html += sentence(fmt::format("{}; {}, one thread{}, {}, {}, {}.", results.command, m.cpu,
+  html += sentence(fmt::format("{}; {}, one thread{}, {}, {}, {}; {}.", results.command, m.cpu,
                                m.is_pinned ? ", pinned to one core" : "", m.instruction_set, m.compiler,
-                               m.kernel));
+                               m.kernel, m.libraries));
   if (results.is_smoke) html += sentence("A smoke run: a few poses and points. The times mean little.");
   html += "<h2>In words</h2>\n" + frame_words(results) + accuracy_words(results);
+  for (const std::string& words : budget_words(results)) html += sentence(words);
   for (const std::string& words : paper_words(results)) html += sentence(words);
   const auto broken = static_cast<std::size_t>(std::count_if(results.checks.begin(), results.checks.end(),
                                                              [](const CheckRow& row) { return !row.holds; }));

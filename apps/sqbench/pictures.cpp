@@ -75,6 +75,68 @@ void add_accuracy(const Results& results, std::vector<Picture>& pictures) {
   }
 }
 
+/// Geometric means over the models of what has a row for each of them.
+class Means {
+ public:
+  void add(const std::string& name, const std::string& family, double x, double y, double bytes) {
+    if (!(x > 0) || !(y > 0) || !(bytes > 0)) return;
+    auto it = std::find_if(sums_.begin(), sums_.end(), [&](const Sum& sum) { return sum.name == name; });
+    if (it == sums_.end()) it = sums_.insert(it, {name, family, 0, 0, 0, 0});
+    it->x += std::log(x), it->y += std::log(y), it->bytes += std::log(bytes);
+    ++it->count;
+  }
+  std::vector<Series> series(std::size_t models, const char* x_unit, const char* y_unit) const {
+    SeriesByFamily by_family;
+    for (const Sum& sum : sums_) {
+      if (sum.count != models) continue;
+      const auto mean = [&](double value) { return std::exp(value / static_cast<double>(sum.count)); };
+      by_family.add(sum.family, {mean(sum.x), mean(sum.y), mean(sum.bytes),
+                                 fmt::format("{}: {:.3g} {}, {:.3g} {}, {:.3g} KB", sum.name, mean(sum.x),
+                                             x_unit, mean(sum.y), y_unit, mean(sum.bytes) / 1e3)});
+    }
+    return by_family.series;
+  }
+
+ private:
+  struct Sum {
+    std::string name, family;
+    double x, y, bytes;
+    std::size_t count;
+  };
+  std::vector<Sum> sums_;
+};
+
+/// All methods from coarse to fine, over all models.
+void add_means(const Results& results, std::vector<Picture>& pictures) {
+  Means time, angle, budget;
+  for (const AccuracyRow& row : results.accuracy) {
+    const PeerRow* peer = find_peer(results, row.model, row.peer);
+    if (row.shell_percent < 2.9 || peer == nullptr) continue;
+    const auto bytes = static_cast<double>(peer->bytes);
+    time.add(row.peer, peer->family, std::max(row.mean_error_percent, kLeastError_percent), row.ns.median,
+             bytes);
+    angle.add(row.peer, peer->family, std::max(row.normal_mean_deg, 0.1), bytes / 1e3, bytes);
+  }
+  for (const BudgetRow& row : results.budgets)
+    budget.add(fmt::format("{} in {:g} KB", row.family, row.budget_bytes / 1024), row.family,
+               row.mean_error_percent, row.us.median, static_cast<double>(row.bytes));
+  const auto add = [&](const char* name, const std::string& title, const std::string& x, const char* y,
+                       const std::vector<Series>& series) {
+    if (!series.empty()) pictures.push_back({name, title, scatter_svg(title, x, y, series)});
+  };
+  const std::size_t models = results.models.size();
+  add("pareto-time", "What accuracy costs in time and memory: mean over the models",
+      fmt::format("mean distance error in the +-3 % shell, % of R_max; below {} drawn there",
+                  kLeastError_percent),
+      "ns a point", time.series(models, "%", "ns a point"));
+  add("pareto-normals", "What good normals cost in memory: mean over the models",
+      "mean angle to the true normal, degrees; below 0.1 drawn there", "KB resident",
+      angle.series(models, "deg", "KB"));
+  add("budget", "8 to 128 KB an object: error near contact and frame, mean over the models",
+      "mean distance error within 1 % of the surface, % of R_max", "microseconds a touching frame",
+      budget.series(models, "%", "us a frame"));
+}
+
 /// Geometric mean over the models; the line spans the least and the greatest of them.
 std::vector<Bar> bars_over_models(const std::vector<std::pair<std::string, double>>& values) {
   std::vector<Bar> bars;
@@ -184,15 +246,57 @@ void add_rest(const Results& results, std::vector<Picture>& pictures) {
                                     "seconds", bake.series)});
 }
 
+/// The axes of a figure that is drawn from curves.
+struct Figure {
+  const char *figure, *title, *x_title, *y_title;
+  bool is_logarithmic;
+};
+constexpr Figure kFigures[] = {
+    {"13a", "Fig. 13a of the paper: the direction of the force along a slide", "way, % of R_max",
+     "angle between force and way, degrees", false},
+    {"13b", "Fig. 13b of the paper: how the force changes from step to step", "way, % of R_max",
+     "|F_i - F_i-1|, % of the mean force", false},
+    {"14a", "Fig. 14a of the paper: frames of a slide", "pose", "microseconds a frame", false},
+    {"14b", "Fig. 14b of the paper: many contacts", "points of the probe inside the object",
+     "microseconds a frame", false},
+    {"14c", "Fig. 14c of the paper: performance and error, layers 2 to 3",
+     "mean distance error in the +-3 % shell, % of R_max", "points a microsecond", true},
+    {"objects", "The same object in ever more faces", "faces of the object", "microseconds a touching frame",
+     true},
+    {"objects-build", "What preparing it costs", "faces of the object", "seconds", true},
+    {"probes", "The same probe in ever more points", "points of the probe", "microseconds a touching frame",
+     true},
+};
+
+void add_curves(const Results& results, std::vector<Picture>& pictures) {
+  for (const Figure& figure : kFigures) {
+    std::vector<Line> lines;
+    std::string model;
+    for (const CurveRow& row : results.curves) {
+      if (row.figure != figure.figure) continue;
+      model = row.model;
+      lines.push_back({row.curve, row.x, row.y});
+    }
+    if (lines.empty()) continue;
+    const std::string title = fmt::format("{} ({})", figure.title, model);
+    const std::string name = figure.figure[0] == '1' ? fmt::format("fig{}", figure.figure) : figure.figure;
+    pictures.push_back(
+        {name, title, lines_svg(title, figure.x_title, figure.y_title, lines, figure.is_logarithmic)});
+  }
+}
+
 }  // namespace
 
 std::vector<Picture> pictures(const Results& results) {
   std::vector<Picture> all;
+  add_means(results, all);
   add_frames(results, all);
   add_accuracy(results, all);
   add_shares_of_tree(results, all);
   add_memory_by_density(results, all);
+  add_curves(results, all);
   add_rest(results, all);
+  all.insert(all.end(), results.drawings.begin(), results.drawings.end());
   return all;
 }
 

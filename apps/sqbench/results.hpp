@@ -20,7 +20,7 @@ struct Spread {
 Spread spread_of(std::vector<double> values);
 
 struct Machine {
-  std::string cpu, kernel, compiler, instruction_set;
+  std::string cpu, kernel, compiler, instruction_set, libraries;
   unsigned cores{};
   bool is_pinned{};
 };
@@ -89,11 +89,33 @@ struct EffectRow {
   std::string model, variant;
   Spread us;  ///< a touching frame
 };
+/// The finest setting of a method that fits in so many bytes.
+struct BudgetRow {
+  std::string model, family, peer;
+  double budget_bytes{};
+  std::size_t bytes{};
+  double mean_error_percent{};   ///< of the answered points within 1 % of R_max of the surface
+  double depth_error_percent{};  ///< of the penetration, over all of them; no answer means none
+  double wrong_side_percent{};
+  double answered_percent{};
+  double normal_mean_deg{};
+  Spread us;  ///< a touching frame
+};
+/// A line of a figure whose values are numbers of their own, not in another table.
+struct CurveRow {
+  std::string figure;  ///< "13a": the paper's Fig. 13a; or a word
+  std::string model, curve;
+  std::vector<double> x, y;  ///< what they are stands in pictures.cpp; equally many
+};
 /// A check of what was measured. All must hold, or the run ends with an error.
 struct CheckRow {
   std::string model, peer, claim;
   double found{}, allowed{};
   bool holds{};
+};
+
+struct Picture {
+  std::string name, title, svg;
 };
 
 struct Results {
@@ -109,7 +131,10 @@ struct Results {
   std::vector<BakeRow> bake;
   std::vector<ForceRow> force;
   std::vector<EffectRow> effects;
+  std::vector<BudgetRow> budgets;
+  std::vector<CurveRow> curves;
   std::vector<CheckRow> checks;
+  std::vector<Picture> drawings;  ///< of objects and maps; pictures only, no numbers
 };
 
 Machine this_machine(bool is_pinned);
@@ -117,9 +142,6 @@ Machine this_machine(bool is_pinned);
 std::string results_json(const Results& results);
 std::string results_csv(const Results& results);
 /// The page, and the pictures it shows as files of their own.
-struct Picture {
-  std::string name, title, svg;
-};
 std::vector<Picture> pictures(const Results& results);
 std::string results_page(const Results& results, const std::vector<Picture>& pictures);
 

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include <cmath>
 #include <string>
 
 #include <fmt/format.h>
@@ -6,7 +7,6 @@
 
 #include "sqmap/asset/version.hpp"
 
-#include "../common/json_text.hpp"
 #include "results.hpp"
 #include "work.hpp"
 
@@ -23,6 +23,7 @@ Json to_json(const Machine& m) {
           {"kernel", m.kernel},
           {"compiler", m.compiler},
           {"instruction_set", m.instruction_set},
+          {"libraries", m.libraries},
           {"is_pinned", m.is_pinned}};
 }
 Json to_json(const ModelRow& r) {
@@ -90,6 +91,22 @@ Json to_json(const ForceRow& r) {
 Json to_json(const EffectRow& r) {
   return {{"model", r.model}, {"variant", r.variant}, {"us", to_json(r.us)}};
 }
+Json to_json(const BudgetRow& r) {
+  return {{"model", r.model},
+          {"family", r.family},
+          {"peer", r.peer},
+          {"budget_bytes", r.budget_bytes},
+          {"bytes", r.bytes},
+          {"mean_error_percent", r.mean_error_percent},
+          {"depth_error_percent", r.depth_error_percent},
+          {"wrong_side_percent", r.wrong_side_percent},
+          {"answered_percent", r.answered_percent},
+          {"normal_mean_deg", r.normal_mean_deg},
+          {"us", to_json(r.us)}};
+}
+Json to_json(const CurveRow& r) {
+  return {{"figure", r.figure}, {"model", r.model}, {"curve", r.curve}, {"x", r.x}, {"y", r.y}};
+}
 Json to_json(const CheckRow& r) {
   return {{"model", r.model}, {"peer", r.peer},       {"claim", r.claim},
           {"found", r.found}, {"allowed", r.allowed}, {"holds", r.holds}};
@@ -102,23 +119,51 @@ Json rows(const std::vector<Row>& rows) {
   return array;
 }
 
+/// To six digits: more are noise in every time, and no error is told to a millionth.
+void round_numbers(Json& json) {
+  if (json.is_structured())
+    for (auto& item : json) round_numbers(item);
+  if (json.is_number_float() && std::isfinite(json.get<double>()))
+    json = std::stod(fmt::format("{:.6g}", json.get<double>()));
+}
+
 Json whole(const Results& r) {
-  return {{"schema", "sqmap.bench/1"},
-          {"program", std::string("sqbench ") + kVersion},
-          {"command", r.command},
-          {"smoke", r.is_smoke},
-          {"seed", kSeed},
-          {"machine", to_json(r.machine)},
-          {"models", rows(r.models)},
-          {"peers", rows(r.peers)},
-          {"works", rows(r.works)},
-          {"frames", rows(r.frames)},
-          {"accuracy", rows(r.accuracy)},
-          {"memory", rows(r.memory)},
-          {"bake", rows(r.bake)},
-          {"force", rows(r.force)},
-          {"effects", rows(r.effects)},
-          {"checks", rows(r.checks)}};
+  Json json{{"schema", "sqmap.bench/1"},
+            {"program", std::string("sqbench ") + kVersion},
+            {"command", r.command},
+            {"smoke", r.is_smoke},
+            {"seed", kSeed},
+            {"machine", to_json(r.machine)},
+            {"models", rows(r.models)},
+            {"peers", rows(r.peers)},
+            {"works", rows(r.works)},
+            {"frames", rows(r.frames)},
+            {"accuracy", rows(r.accuracy)},
+            {"memory", rows(r.memory)},
+            {"bake", rows(r.bake)},
+            {"force", rows(r.force)},
+            {"effects", rows(r.effects)},
+            {"budgets", rows(r.budgets)},
+            {"curves", rows(r.curves)},
+            {"checks", rows(r.checks)}};
+  round_numbers(json);
+  return json;
+}
+
+/// A line a row: as small as can be compared by eye.
+std::string text_of(const Json& json) {
+  std::string text = "{\n";
+  for (const auto& [name, value] : json.items()) {
+    text += (text.size() > 2 ? ",\n" : "") + Json(name).dump() + ": ";
+    if (!value.is_array() || value.empty()) {
+      text += value.dump();
+      continue;
+    }
+    text += "[\n";
+    for (const Json& row : value) text += (&row == &value.front() ? " " : ",\n ") + row.dump();
+    text += "\n]";
+  }
+  return text + "\n}\n";
 }
 
 std::string csv_field(const std::string& text) {
@@ -134,23 +179,26 @@ void csv_lines(const std::string& table, const Json& row, std::string& text) {
   };
   const std::string peer = row.contains("method")    ? name("method")
                            : row.contains("variant") ? name("variant")
+                           : row.contains("curve")   ? name("curve")
                                                      : name("peer");
-  std::string work = row.contains("claim") ? name("claim") : name("work");
+  std::string work = row.contains("claim")    ? name("claim")
+                     : row.contains("figure") ? name("figure")
+                                              : name("work");
   if (row.contains("shell_percent")) work = fmt::format("shell {} %", row["shell_percent"].get<double>());
   const auto line = [&](const std::string& quantity, const Json& value) {
     if (value.is_number() || value.is_boolean())
       text += fmt::format("{},{},{},{},{},{}\n", table, name("model"), work, peer, quantity, value.dump());
   };
   for (const auto& [key, value] : row.items()) {
-    if (!value.is_object()) line(key, value);
-    if (value.is_object())
+    if (!value.is_structured()) line(key, value);
+    if (value.is_structured())
       for (const auto& [part, number] : value.items()) line(fmt::format("{}.{}", key, part), number);
   }
 }
 
 }  // namespace
 
-std::string results_json(const Results& results) { return apps::json_text(whole(results)); }
+std::string results_json(const Results& results) { return text_of(whole(results)); }
 
 std::string results_csv(const Results& results) {
   std::string text = "table,model,work,peer,quantity,value\n";

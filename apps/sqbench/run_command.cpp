@@ -17,13 +17,15 @@
 namespace sqmap::apps {
 namespace {
 
-constexpr std::array<bench::Suite, 6> kSuites{{
+constexpr std::array<bench::Suite, 8> kSuites{{
     {"frames", "whole frames: the probe touching, far and grasping, against each object", bench::run_frames},
     {"accuracy", "errors and time a point, in shells around the surface, at every setting",
      bench::run_accuracy},
     {"memory", "resident bytes, beside the paper's Table 1", bench::run_memory},
     {"bake", "what preparing an object costs for each accuracy", bench::run_bake},
     {"force", "jumps of the force as a point slides over the object", bench::run_force},
+    {"budget", "errors and frames of every method in 8 to 128 KB an object", bench::run_budget},
+    {"size", "frames as the object and the probe grow", bench::run_size},
     {"effects", "what each output and option of the runtime adds to a frame", bench::run_effects},
 }};
 
@@ -123,7 +125,7 @@ std::function<Exit(Console&)> declare_run(CLI::App& app) {
       "  sqbench run frames -o build/bench\n"
       "  sqbench run accuracy --meshes build/meshes/elephant.off --bundles build/bundles -o build/bench\n"
       "  sqbench run all --smoke -o build/smoke\n");
-  app.add_option("SUITE", args->suite, "frames, accuracy, memory, bake, force, effects or all")
+  app.add_option("SUITE", args->suite, "One of those above, or all")
       ->required()
       ->check(CLI::IsMember(names).description(""));
   app.add_option("--meshes", args->meshes, "Objects (default: six of build/meshes)")->type_name("FILE...");

@@ -4,7 +4,9 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <memory>
 #include <numbers>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -103,6 +105,49 @@ void run_shell(const SuiteInput& input, const Model& model, const std::vector<Bu
   }
 }
 
+/// Fig. 14c: one line a density of the paper's maps, from its layer 2 over ever more subdivisions in layer 3;
+/// and ours, from the finest level of the maps to the coarsest.
+void run_performance(const SuiteInput& input, const Model& model, Results& results) {
+  input.note(fmt::format("accuracy: {}, performance and error", model.name));
+  const Shell shell = make_shell(model, kBand, input.is_smoke ? 1000 : 10000);
+  const Cloud cloud(shell.points_m);
+  Hits hits(cloud.count);
+  constexpr unsigned kFinest = 200;  // rows, subdivisions included
+  std::vector<CurveRow> rows;
+  std::vector<std::pair<std::size_t, std::unique_ptr<Peer>>> peers;  // and their curves
+  const auto add_curve = [&](std::string name) {
+    rows.push_back({"14c", model.name, std::move(name), {}, {}});
+  };
+  for (const unsigned density : {25U, 50U, 100U, 200U}) {
+    if (input.is_smoke && density > 25) break;
+    add_curve(fmt::format("paper's query, {} x {}", density, 2 * density));
+    for (unsigned subdivisions = 0; density << subdivisions <= (input.is_smoke ? 50 : kFinest);
+         ++subdivisions)
+      peers.emplace_back(rows.size() - 1, make_paper(model, density, 2 * density, subdivisions));
+  }
+  std::uint32_t levels = 1;
+  for (const Part& part : model.asset.parts) levels = std::max(levels, part.map.level_count);
+  for (const int layer : {2, 3}) {
+    add_curve(fmt::format("sqmap layer {}, by level", layer));
+    for (unsigned level = 0; level < levels; ++level)
+      peers.emplace_back(rows.size() - 1, make_sqmap(model, layer, level));
+  }
+  std::vector<Contestant> contestants;
+  for (const auto& [row, peer] : peers)
+    contestants.push_back({"", [&, one = peer.get()](std::size_t) {
+                             one->answer(cloud, {}, hits);
+                             return hits.count;
+                           }});
+  const std::vector<Timing> timings = measure(contestants, 1, input.is_smoke ? 3 : 11);
+  for (std::size_t i = 0; i < peers.size(); ++i) {
+    auto& [at, peer] = peers[i];
+    CurveRow& row = rows[at];
+    row.x.push_back(compare(model, {{}, std::move(peer)}, shell, cloud, hits).mean_error_percent);
+    row.y.push_back(static_cast<double>(cloud.count) / timings[i].spread(1e6).median);
+  }
+  for (CurveRow& row : rows) results.curves.push_back(std::move(row));
+}
+
 }  // namespace
 
 void run_accuracy(const SuiteInput& input, Results& results) {
@@ -112,6 +157,7 @@ void run_accuracy(const SuiteInput& input, Results& results) {
       peers.push_back(build_peer(entrant, model, results));
     for (const double share : {kBand, 0.005}) run_shell(input, model, peers, share, results);
   }
+  if (!input.models.empty()) run_performance(input, input.models.front(), results);
 }
 
 }  // namespace sqmap::bench

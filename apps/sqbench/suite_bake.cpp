@@ -10,6 +10,7 @@
 #include "sqmap/bake/bake.hpp"
 #include "sqmap/io/bundle.hpp"
 
+#include "drawings.hpp"
 #include "field.hpp"
 #include "suites.hpp"
 
@@ -23,6 +24,7 @@ double seconds_since(std::chrono::steady_clock::time_point start) {
 }  // namespace
 
 void run_bake(const SuiteInput& input, Results& results) {
+  draw_objects(input, results);
   constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
   const std::vector<double> targets = input.is_smoke ? std::vector{1.0} : std::vector{0.5, 0.2, 0.1, 0.05};
   for (const Model& model : input.models) {

@@ -9,6 +9,7 @@
 
 #include <fmt/format.h>
 
+#include "contact_curves.hpp"
 #include "peer.hpp"
 #include "peer_rows.hpp"
 #include "scene_frames.hpp"
@@ -125,6 +126,7 @@ void run_model(const SuiteInput& input, const Model& model, Results& results) {
 
 void run_frames(const SuiteInput& input, Results& results) {
   for (const Model& model : input.models) run_model(input, model, results);
+  if (!input.models.empty()) run_contact_curves(input, input.models.front(), results);
   run_scene(input, results);
 }
 

@@ -30,5 +30,7 @@ void run_memory(const SuiteInput& input, Results& results);
 void run_bake(const SuiteInput& input, Results& results);
 void run_force(const SuiteInput& input, Results& results);
 void run_effects(const SuiteInput& input, Results& results);
+void run_budget(const SuiteInput& input, Results& results);
+void run_size(const SuiteInput& input, Results& results);
 
 }  // namespace sqmap::bench

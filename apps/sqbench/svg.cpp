@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstddef>
 #include <limits>
 
 #include <fmt/format.h>
@@ -11,9 +12,11 @@
 namespace sqmap::bench {
 namespace {
 
-constexpr std::array<const char*, 8> kColours{"#c0392b", "#e67e22", "#2471a3", "#17a589",
-                                              "#7d3c98", "#566573", "#b7950b", "#229954"};
+constexpr std::array<const char*, 16> kColours{
+    "#c0392b", "#e67e22", "#2471a3", "#17a589", "#7d3c98", "#566573", "#b7950b", "#229954",
+    "#000000", "#ff5ca8", "#5dade2", "#784212", "#9acd32", "#4a235a", "#f1948a", "#0b5345"};
 constexpr double kWidth = 860;
+constexpr std::size_t kMostDots = 40;  ///< of a line; more would hide it
 
 std::string opening(double height, const std::string& title) {
   return fmt::format(
@@ -28,11 +31,13 @@ std::string text(double x, double y, const char* anchor, const std::string& word
                      escaped(words));
 }
 
-/// A logarithmic axis over whole decades.
+/// A logarithmic axis over whole decades, or a linear one over whole steps.
 struct Axis {
-  double low, high;      // exponents of ten
+  double low, high;      // exponents of ten, or values
   double begin, length;  // on the page; negative length: upwards
-  double at(double value) const { return begin + (std::log10(value) - low) / (high - low) * length; }
+  double step = 0;       // between ticks; 0: logarithmic
+  double place(double u) const { return begin + (u - low) / (high - low) * length; }
+  double at(double value) const { return place(step > 0 ? value : std::log10(value)); }
 };
 
 Axis axis_over(double least, double most, double begin, double length) {
@@ -40,9 +45,59 @@ Axis axis_over(double least, double most, double begin, double length) {
   return {low, std::max(high, low + 1), begin, length};
 }
 
+/// Ticks at 1, 2 or 5 times a power of ten, at least four of them.
+Axis linear_axis(double least, double most, double begin, double length) {
+  const double range = std::max(most - least, 1e-12 + 1e-9 * std::abs(most));
+  double step = std::pow(10.0, std::floor(std::log10(range)));
+  if (range / step < 2)
+    step /= 5;
+  else if (range / step < 4)
+    step /= 2;
+  return {step * std::floor(least / step + 1e-9), step * std::ceil(most / step - 1e-9), begin, length, step};
+}
+
 std::string power_of_ten(int exponent) {
   return exponent >= -4 && exponent <= 4 ? fmt::format("{:g}", std::pow(10.0, exponent))
                                          : fmt::format("1e{}", exponent);
+}
+
+struct Tick {
+  double at;
+  std::string words;
+};
+std::vector<Tick> ticks_of(const Axis& axis) {
+  std::vector<Tick> ticks;
+  if (axis.step > 0) {
+    const auto count = static_cast<int>(std::lround((axis.high - axis.low) / axis.step));
+    for (int i = 0; i <= count; ++i) {
+      const double value = axis.low + i * axis.step;  // a sum of steps misses zero by their rounding
+      ticks.push_back(
+          {axis.at(value), fmt::format("{:.4g}", std::abs(value) < 1e-9 * axis.step ? 0 : value)});
+    }
+    return ticks;
+  }
+  for (int e = static_cast<int>(axis.low); e <= static_cast<int>(axis.high); ++e)
+    ticks.push_back({axis.place(e), power_of_ten(e)});
+  return ticks;
+}
+
+/// Grid lines, their numbers and the titles of both axes.
+std::string frame_of(const Axis& x, const Axis& y, const std::string& x_title, const std::string& y_title) {
+  const double left = x.begin, right = x.begin + x.length, bottom = y.begin, top = y.begin + y.length;
+  std::string svg;
+  for (const auto& [at, words] : ticks_of(x)) {
+    svg += fmt::format("<line x1=\"{0:.1f}\" x2=\"{0:.1f}\" y1=\"{1}\" y2=\"{2}\" stroke=\"#ddd\"/>\n", at,
+                       top, bottom);
+    svg += text(at, bottom + 18, "middle", words);
+  }
+  for (const auto& [at, words] : ticks_of(y)) {
+    svg += fmt::format("<line x1=\"{1}\" x2=\"{2}\" y1=\"{0:.1f}\" y2=\"{0:.1f}\" stroke=\"#ddd\"/>\n", at,
+                       left, right);
+    svg += text(left - 8, at + 4, "end", words);
+  }
+  svg += text((left + right) / 2, bottom + 40, "middle", x_title);
+  return svg + text(20, (top + bottom) / 2, "middle", y_title,
+                    fmt::format("transform=\"rotate(-90 20 {})\"", (top + bottom) / 2).c_str());
 }
 
 double disc_radius(double bytes) {
@@ -78,21 +133,7 @@ std::string scatter_svg(const std::string& title, const std::string& x_title, co
     return svg + text(kLeft, 60, "start", "no values") + "</svg>\n";
   const Axis x = axis_over(x_low, x_high, kLeft, kRight - kLeft),
              y = axis_over(y_low, y_high, kBottom, kTop - kBottom);
-  for (int e = static_cast<int>(x.low); e <= static_cast<int>(x.high); ++e) {
-    const double at = x.at(std::pow(10.0, e));
-    svg += fmt::format("<line x1=\"{0:.1f}\" x2=\"{0:.1f}\" y1=\"{1}\" y2=\"{2}\" stroke=\"#ddd\"/>\n", at,
-                       kTop, kBottom);
-    svg += text(at, kBottom + 18, "middle", power_of_ten(e));
-  }
-  for (int e = static_cast<int>(y.low); e <= static_cast<int>(y.high); ++e) {
-    const double at = y.at(std::pow(10.0, e));
-    svg += fmt::format("<line x1=\"{1}\" x2=\"{2}\" y1=\"{0:.1f}\" y2=\"{0:.1f}\" stroke=\"#ddd\"/>\n", at,
-                       kLeft, kRight);
-    svg += text(kLeft - 8, at + 4, "end", power_of_ten(e));
-  }
-  svg += text((kLeft + kRight) / 2, kBottom + 40, "middle", x_title);
-  svg += text(20, (kTop + kBottom) / 2, "middle", y_title,
-              fmt::format("transform=\"rotate(-90 20 {})\"", (kTop + kBottom) / 2).c_str());
+  svg += frame_of(x, y, x_title, y_title);
   double legend = kTop + 12;
   for (std::size_t i = 0; i < series.size(); ++i) {
     const char* colour = kColours[i % kColours.size()];
@@ -124,6 +165,56 @@ std::string scatter_svg(const std::string& title, const std::string& x_title, co
   return svg + "</svg>\n";
 }
 
+std::string lines_svg(const std::string& title, const std::string& x_title, const std::string& y_title,
+                      const std::vector<Line>& lines, bool is_logarithmic) {
+  constexpr double kHeight = 420, kLeft = 80, kRight = 610, kTop = 44, kBottom = 360;
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  double x_low = kInfinity, x_high = -kInfinity, y_low = x_low, y_high = x_high;
+  const auto is_drawn = [&](const Line& line, std::size_t i) {
+    return std::isfinite(line.x[i]) && std::isfinite(line.y[i]) &&
+           (!is_logarithmic || (line.x[i] > 0 && line.y[i] > 0));
+  };
+  for (const Line& line : lines)
+    for (std::size_t i = 0; i < line.x.size(); ++i) {
+      if (!is_drawn(line, i)) continue;
+      x_low = std::min(x_low, line.x[i]);
+      x_high = std::max(x_high, line.x[i]);
+      y_low = std::min(y_low, line.y[i]);
+      y_high = std::max(y_high, line.y[i]);
+    }
+  std::string svg = opening(kHeight, title);
+  if (!std::isfinite(x_low)) return svg + text(kLeft, 60, "start", "no values") + "</svg>\n";
+  if (!is_logarithmic && y_low < 0.5 * y_high) y_low = std::min(y_low, 0.0);
+  const auto axis = is_logarithmic ? axis_over : linear_axis;
+  const Axis x = axis(x_low, x_high, kLeft, kRight - kLeft), y = axis(y_low, y_high, kBottom, kTop - kBottom);
+  svg += frame_of(x, y, x_title, y_title);
+  double legend = kTop + 12;
+  for (std::size_t l = 0; l < lines.size(); ++l) {
+    const Line& line = lines[l];
+    const char* colour = kColours[l % kColours.size()];
+    std::string path;
+    bool is_down = false;
+    for (std::size_t i = 0; i < line.x.size(); ++i) {
+      if (is_drawn(line, i))
+        path += fmt::format("{}{:.1f} {:.1f} ", is_down ? "L" : "M", x.at(line.x[i]), y.at(line.y[i]));
+      is_down = is_drawn(line, i);
+    }
+    svg += fmt::format("<path d=\"{}\" fill=\"none\" stroke=\"{}\" stroke-width=\"1.4\"/>\n", path, colour);
+    if (line.x.size() <= kMostDots)
+      for (std::size_t i = 0; i < line.x.size(); ++i)
+        if (is_drawn(line, i))
+          svg += fmt::format(
+              "<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"3\" fill=\"{}\"><title>{}: {:.4g}, "
+              "{:.4g}</title></circle>\n",
+              x.at(line.x[i]), y.at(line.y[i]), colour, escaped(line.name), line.x[i], line.y[i]);
+    svg += fmt::format("<rect x=\"{}\" y=\"{}\" width=\"16\" height=\"4\" fill=\"{}\"/>\n", kRight + 14,
+                       legend - 6, colour);
+    svg += text(kRight + 36, legend, "start", line.name);
+    legend += 20;
+  }
+  return svg + "</svg>\n";
+}
+
 std::string bars_svg(const std::string& title, const std::string& x_title, const std::vector<Bar>& bars) {
   constexpr double kLeft = 230, kRight = 780, kTop = 44, kRow = 22;
   const double bottom = kTop + kRow * static_cast<double>(bars.size());
@@ -135,11 +226,10 @@ std::string bars_svg(const std::string& title, const std::string& x_title, const
   std::string svg = opening(bottom + 50, title);
   if (!(least > 0) || !std::isfinite(least)) return svg + text(kLeft, 60, "start", "no values") + "</svg>\n";
   const Axis x = axis_over(least, most, kLeft, kRight - kLeft);
-  for (int e = static_cast<int>(x.low); e <= static_cast<int>(x.high); ++e) {
-    const double at = x.at(std::pow(10.0, e));
+  for (const auto& [at, words] : ticks_of(x)) {
     svg += fmt::format("<line x1=\"{0:.1f}\" x2=\"{0:.1f}\" y1=\"{1}\" y2=\"{2}\" stroke=\"#ddd\"/>\n", at,
                        kTop, bottom);
-    svg += text(at, bottom + 16, "middle", power_of_ten(e));
+    svg += text(at, bottom + 16, "middle", words);
   }
   svg += text((kLeft + kRight) / 2, bottom + 38, "middle", x_title);
   double y = kTop;
@@ -152,6 +242,13 @@ std::string bars_svg(const std::string& title, const std::string& x_title, const
     svg += text(x.at(bar.upper) + 6, y + 15, "start", fmt::format("{:.3g}", bar.value));
     y += kRow;
   }
+  return svg + "</svg>\n";
+}
+
+std::string drawing_svg(const std::string& title, double height, const std::string& inner,
+                        const std::vector<Caption>& captions) {
+  std::string svg = opening(height, title) + inner;
+  for (const Caption& caption : captions) svg += text(caption.x, caption.y, "middle", caption.words);
   return svg + "</svg>\n";
 }
 

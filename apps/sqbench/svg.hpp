@@ -19,6 +19,15 @@ struct Series {
 std::string scatter_svg(const std::string& title, const std::string& x_title, const std::string& y_title,
                         const std::vector<Series>& series);
 
+/// Points joined in their order.
+struct Line {
+  std::string name;
+  std::vector<double> x, y;  ///< equally many; a NaN breaks the line
+};
+/// `is_logarithmic`: both axes; only positive values are drawn then.
+std::string lines_svg(const std::string& title, const std::string& x_title, const std::string& y_title,
+                      const std::vector<Line>& lines, bool is_logarithmic);
+
 /// One bar from zero with its quartiles.
 struct Bar {
   std::string name;
@@ -27,6 +36,14 @@ struct Bar {
 };
 /// Bars over a logarithmic axis, one below the other.
 std::string bars_svg(const std::string& title, const std::string& x_title, const std::vector<Bar>& bars);
+
+struct Caption {
+  double x{}, y{};  ///< of its middle
+  std::string words;
+};
+/// Markup of the caller's under a title.
+std::string drawing_svg(const std::string& title, double height, const std::string& inner,
+                        const std::vector<Caption>& captions);
 
 /// `text` with the characters that markup reserves written as entities.
 std::string escaped(const std::string& text);

@@ -190,6 +190,19 @@ Sequence make_sequence(const Model& model, const Probe& probe, Contact contact, 
   return sequence;
 }
 
+std::vector<Placement> make_press(const Model& model, const Probe& probe, std::size_t poses) {
+  constexpr double kFirst = 0.01, kLast = -0.2;
+  const Search search(model, probe);
+  std::mt19937_64 engine(kSeed);
+  const auto turn = rotation<float>(random_turn(engine));
+  std::vector<Placement> press;
+  for (std::size_t i = 0; i < poses; ++i) {
+    const double t = static_cast<double>(i) / static_cast<double>(std::max<std::size_t>(poses - 1, 1));
+    press.push_back(search.approach(turn, spiral(0.5), (kFirst + t * (kLast - kFirst)) * model.r_max_m()));
+  }
+  return press;
+}
+
 Shell make_shell(const Model& model, double share, std::size_t count) {
   std::mt19937_64 engine(kSeed + static_cast<std::uint64_t>(share * 1e4));
   const auto& mesh = model.mesh;

@@ -40,6 +40,9 @@ struct Sequence {
 /// point within the band. Grasp: of many poses less than 3 % deep, those with contacts nearest to 440.
 Sequence make_sequence(const Model& model, const Probe& probe, Contact contact, std::size_t poses);
 
+/// The probe coming from one side: first 1 % of R_max above the surface, last 20 % deep.
+std::vector<Placement> make_press(const Model& model, const Probe& probe, std::size_t poses);
+
 /// Random points around the surface, uniform over its area and over the signed distance along the normal,
 /// those kept whose distance is within `share` of R_max.
 struct Shell {

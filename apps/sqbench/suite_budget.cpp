@@ -1,0 +1,198 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+//
+// So many bytes an object: of each method the finest setting that fits, and what that gives. sqmap's bundles
+// are baked for each budget.
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <numbers>
+#include <optional>
+#include <stdexcept>
+
+#include <fmt/format.h>
+
+#include "sqmap/bake/bake.hpp"
+#include "sqmap/runtime/object.hpp"
+
+#include "baked.hpp"
+#include "peer_rows.hpp"
+#include "suites.hpp"
+#include "timing.hpp"
+#include "work.hpp"
+
+namespace sqmap::bench {
+namespace {
+
+constexpr double kNear = 0.01;  ///< of R_max: near contact
+constexpr double kNormalFrom = 0.001;
+
+/// A family of rivals by a number that makes them larger.
+struct Ladder {
+  const char* family;
+  int least, most;
+  std::function<Entrant(int)> at;
+};
+
+Entrant entrant(std::string id, const char* family,
+                std::function<std::unique_ptr<Peer>(const Model&)> build) {
+  return {std::move(id), family, std::move(build), 0};
+}
+
+std::vector<Ladder> ladders() {
+  const auto size = [](int n) { return static_cast<unsigned>(n); };
+  std::vector<Ladder> all;
+  all.push_back({"grid-int16-simd", 8, 64, [=](int n) {
+                   return entrant(
+                       fmt::format("grid-int16-{}-simd", n), "grid-int16-simd",
+                       [=](const Model& m) { return make_grid(m, GridCode::kInt16Simd, size(n)); });
+                 }});
+  all.push_back({"grid-float-simd", 8, 64, [=](int n) {
+                   return entrant(
+                       fmt::format("grid-float-{}-simd", n), "grid-float-simd",
+                       [=](const Model& m) { return make_grid(m, GridCode::kFloatSimd, size(n)); });
+                 }});
+  all.push_back({"bricks-8bit-simd", 8, 128, [=](int n) {
+                   return entrant(fmt::format("bricks-8bit-{}-simd", n), "bricks-8bit-simd",
+                                  [=](const Model& m) { return make_bricks(m, size(n)); });
+                 }});
+  // Bounds in steps of a tenth, from 10 % of R_max down.
+  all.push_back({"adf-float-128", 0, 50, [=](int n) {
+                   const double bound = 10 * std::pow(0.9, n);
+                   return entrant(fmt::format("adf-float-128-{:.3g}", bound), "adf-float-128",
+                                  [=](const Model& m) { return make_adf(m, 128, bound); });
+                 }});
+  all.push_back({"paper-layer2", 4, 64, [=](int n) {
+                   return entrant(fmt::format("paper-{}x{}-layer2", n, 2 * n), "paper-layer2",
+                                  [=](const Model& m) { return make_paper(m, size(n), 2 * size(n), 0); });
+                 }});
+  all.push_back(
+      {"embree-closest", 0, 0, [](int) { return entrant("embree-closest", "embree-closest", make_embree); }});
+  all.push_back(
+      {"cgal-closest", 0, 0, [](int) { return entrant("cgal-closest", "cgal-closest", make_cgal); }});
+  return all;
+}
+
+/// The largest that fits; none where not even the least does.
+std::optional<BuiltPeer> finest(const Ladder& ladder, const Model& model, double budget_bytes,
+                                Results& unused) {
+  std::optional<BuiltPeer> best;
+  int low = ladder.least, high = ladder.most;
+  while (low <= high) {
+    const int middle = low + (high - low) / 2;
+    BuiltPeer built = build_peer(ladder.at(middle), model, unused);
+    if (static_cast<double>(built.peer->bytes()) <= budget_bytes) {
+      best = std::move(built);
+      low = middle + 1;
+    } else {
+      high = middle - 1;
+    }
+  }
+  return best;
+}
+
+/// Bakes with ever lower limits until what the runtime keeps fits. Parts cost half a kilobyte each before
+/// their maps begin, so small budgets get few.
+std::optional<Model> bake_within(const Model& model, double budget_bytes, bool is_smoke) {
+  bake::BakeOptions options;
+  options.set(bake::Quality::kFine);
+  options.max_error_percent = is_smoke ? 0.5 : 0.005;  // the limit is to be the memory
+  for (double share = 0.9; share > 0.3; share *= 0.8) {
+    options.max_bytes = static_cast<std::uint64_t>(share * budget_bytes);
+    options.max_parts = static_cast<std::uint32_t>(std::clamp(share * budget_bytes / 2048, 2.0, 48.0));
+    std::optional<Model> baked = baked_again(model, options);
+    const auto object = runtime::Object::build(baked->asset);
+    if (!object) throw std::runtime_error(object.error().finding);
+    if (static_cast<double>(object.value().resident_bytes()) <= budget_bytes) return baked;
+  }
+  return std::nullopt;
+}
+
+/// Errors near contact.
+BudgetRow errors_of(const Model& model, const Peer& peer, const Shell& shell, const Cloud& cloud) {
+  Hits hits(cloud.count);
+  peer.answer(cloud, {}, hits);
+  BudgetRow row;
+  double error = 0, depth = 0, angle_rad = 0;
+  std::size_t angles = 0, wrong = 0;
+  std::vector<double> told_m(cloud.count, std::numeric_limits<double>::quiet_NaN());
+  for (std::size_t i = 0; i < hits.count; ++i) {
+    const std::uint32_t at = cloud.source[hits.point[i]];
+    told_m[at] = hits.distance_m[i];
+    error += std::abs(told_m[at] - shell.distance_m[at]);
+    const Vec3d normal{hits.normal_x[i], hits.normal_y[i], hits.normal_z[i]};
+    if (std::abs(shell.distance_m[at]) <= kNormalFrom * model.r_max_m() || !(norm(normal) > 0)) continue;
+    angle_rad += std::atan2(norm(cross(normal, shell.normal[at])), dot(normal, shell.normal[at]));
+    ++angles;
+  }
+  for (std::size_t i = 0; i < cloud.count; ++i) {
+    const double told = std::isnan(told_m[i]) ? 0 : std::max(0.0, -told_m[i]);
+    depth += std::abs(told - std::max(0.0, -shell.distance_m[i]));
+    if ((told_m[i] < 0) != (shell.distance_m[i] < 0)) ++wrong;  // NaN: outside
+  }
+  const auto percent_of = [](double part, std::size_t whole) {
+    return whole == 0 ? std::numeric_limits<double>::quiet_NaN() : 100 * part / static_cast<double>(whole);
+  };
+  row.mean_error_percent = percent_of(error / model.r_max_m(), hits.count);
+  row.depth_error_percent = percent_of(depth / model.r_max_m(), cloud.count);
+  row.wrong_side_percent = percent_of(static_cast<double>(wrong), cloud.count);
+  row.answered_percent = percent_of(static_cast<double>(hits.count), cloud.count);
+  row.normal_mean_deg = percent_of(angle_rad * 1.8 / std::numbers::pi, angles);
+  return row;
+}
+
+void run_model(const SuiteInput& input, const Model& model, double budget_bytes, const Shell& shell,
+               const Cloud& cloud, const Probe& probe, const Sequence& sequence, Results& results) {
+  input.note(fmt::format("budget: {}, {} KB", model.name, budget_bytes / 1024));
+  Results unused;  // settings that were tried on the way are no peers of the report
+  std::vector<BuiltPeer> peers;
+  const std::optional<Model> baked = bake_within(model, budget_bytes, input.is_smoke);
+  if (baked)
+    for (const int layer : {2, 3}) {
+      const std::string id = fmt::format("sqmap-layer{}", layer);
+      peers.push_back({entrant(id, "", {}), make_sqmap(*baked, layer, 0)});
+      peers.back().entrant.family = id;
+    }
+  for (const Ladder& ladder : ladders())
+    if (auto built = finest(ladder, model, budget_bytes, unused)) peers.push_back(std::move(*built));
+
+  Hits hits(probe.cloud.count);
+  std::vector<Contestant> contestants;
+  for (const BuiltPeer& built : peers)
+    contestants.push_back({built.entrant.id, [&](std::size_t pose) {
+                             built.peer->answer(probe.cloud, sequence.object_from_probe[pose], hits);
+                             return hits.count;
+                           }});
+  const std::vector<Timing> timings =
+      measure(contestants, sequence.object_from_probe.size(), input.is_smoke ? 3 : 11);
+  for (std::size_t i = 0; i < peers.size(); ++i) {
+    BudgetRow row = errors_of(model, *peers[i].peer, shell, cloud);
+    row.model = model.name;
+    row.family = peers[i].entrant.family;
+    row.peer = peers[i].entrant.id;
+    row.budget_bytes = budget_bytes;
+    row.bytes = peers[i].peer->bytes();
+    row.us = timings[i].spread(1e6);
+    const bool fits = static_cast<double>(row.bytes) <= budget_bytes;
+    results.checks.push_back({model.name, row.peer, fmt::format("fits in {} KB: bytes", budget_bytes / 1024),
+                              static_cast<double>(row.bytes), budget_bytes, fits});
+    results.budgets.push_back(std::move(row));
+  }
+}
+
+}  // namespace
+
+void run_budget(const SuiteInput& input, Results& results) {
+  const std::vector<double> budgets_kb =
+      input.is_smoke ? std::vector{32.0} : std::vector{8.0, 16.0, 32.0, 64.0, 128.0};
+  for (const Model& model : input.models) {
+    const Shell shell = make_shell(model, kNear, input.is_smoke ? 1000 : 20000);
+    const Cloud cloud(shell.points_m);
+    const Probe probe = scaled_probe(input.probe, model);
+    const Sequence sequence = make_sequence(model, probe, Contact::kTouching, input.is_smoke ? 2 : 12);
+    for (const double budget_kb : budgets_kb)
+      run_model(input, model, 1024 * budget_kb, shell, cloud, probe, sequence, results);
+  }
+}
+
+}  // namespace sqmap::bench
