@@ -12,6 +12,7 @@
 #include "contact_curves.hpp"
 #include "peer.hpp"
 #include "peer_rows.hpp"
+#include "peer_voxmap.hpp"
 #include "scene_frames.hpp"
 #include "suites.hpp"
 #include "timing.hpp"
@@ -20,37 +21,67 @@
 namespace sqmap::bench {
 namespace {
 
-/// A method that knows triangles only.
+enum class Tells { kPairs, kAny, kPoints };
+/// A method that knows which triangles cross or which points touch, but no distance.
 struct ContactEntrant {
   const char* id;
   const char* family;
-  bool tells_all;  ///< otherwise whether there is any
+  Tells tells;
   std::unique_ptr<ContactPeer> (*build)(const Model& model, const bake::Mesh& probe);
+  unsigned resolution = 0;  ///< of those that tell points
 };
 template <FclTree tree, bool first_only>
 std::unique_ptr<ContactPeer> build_fcl(const Model& model, const bake::Mesh& probe) {
   return make_fcl(model, probe, tree, first_only);
 }
+template <unsigned resolution>
+std::unique_ptr<ContactPeer> build_voxmap(const Model& model, const bake::Mesh& probe) {
+  return make_voxmap(model, probe, resolution);
+}
 constexpr ContactEntrant kContactEntrants[] = {
-    {kTreeReference, "fcl-obb", true, build_fcl<FclTree::kObb, false>},
-    {"fcl-obb-first-contact", "fcl-obb", false, build_fcl<FclTree::kObb, true>},
-    {"fcl-kdop18-all-contacts", "fcl-kdop18", true, build_fcl<FclTree::kKdop18, false>},
-    {"fcl-kdop18-first-contact", "fcl-kdop18", false, build_fcl<FclTree::kKdop18, true>},
-    {"bullet-gimpact-all-contacts", "bullet-gimpact", false, make_gimpact},  // merges contacts of neighbours
+    {kTreeReference, "fcl-obb", Tells::kPairs, build_fcl<FclTree::kObb, false>},
+    {"fcl-obb-first-contact", "fcl-obb", Tells::kAny, build_fcl<FclTree::kObb, true>},
+    {"fcl-kdop18-all-contacts", "fcl-kdop18", Tells::kPairs, build_fcl<FclTree::kKdop18, false>},
+    {"fcl-kdop18-first-contact", "fcl-kdop18", Tells::kAny, build_fcl<FclTree::kKdop18, true>},
+    {"bullet-gimpact-all-contacts", "bullet-gimpact", Tells::kAny,
+     make_gimpact},  // merges contacts of neighbours
+    {"voxmap-pointshell-128", "voxmap-pointshell", Tells::kPoints, build_voxmap<128>, 128},
+    {"voxmap-pointshell-256", "voxmap-pointshell", Tells::kPoints, build_voxmap<256>, 256},
 };
 struct BuiltContactPeer {
   const ContactEntrant* entrant;
   std::unique_ptr<ContactPeer> peer;
 };
 
+/// All points inside must be told, and none that is farther outside than a voxel reaches.
+void check_points(const Model& model, const Probe& probe, const BuiltContactPeer& built, const char* work,
+                  const Placement& placement, Results& results) {
+  const double reach_m = voxel_reach_m(model, built.entrant->resolution);
+  std::size_t least = 0, most = 0;
+  for (const Vec3f& p : probe.cloud.points_m) {
+    const double d = model.oracle->signed_distance(cast<double>(placement.apply(p)));
+    if (d < 0) ++least;
+    if (d <= reach_m) ++most;
+  }
+  const std::size_t found = built.peer->contacts(placement);
+  results.checks.push_back(
+      {model.name, built.entrant->id,
+       fmt::format("points told, {}: no more than lie within a voxel of the object", work),
+       static_cast<double>(found), static_cast<double>(most), found >= least && found <= most});
+}
+
 /// Against every pair of triangles, in one pose. A pair that barely touches may go either way.
 void check_contacts(const Model& model, const Probe& probe, const std::vector<BuiltContactPeer>& peers,
                     const char* work, const Placement& placement, Results& results) {
   const auto expected = static_cast<double>(count_crossing_pairs(model, probe.mesh, placement));
   for (const BuiltContactPeer& built : peers) {
+    if (built.entrant->tells == Tells::kPoints) {
+      check_points(model, probe, built, work, placement, results);
+      continue;
+    }
     const auto found = static_cast<double>(built.peer->contacts(placement));
     const bool agrees_on_any = (found > 0) == (expected > 0);
-    if (!built.entrant->tells_all) {
+    if (built.entrant->tells == Tells::kAny) {
       results.checks.push_back({model.name, built.entrant->id,
                                 fmt::format("says whether any triangles cross, {}: contacts, pairs", work),
                                 found, expected, agrees_on_any});
@@ -70,6 +101,7 @@ void run_model(const SuiteInput& input, const Model& model, Results& results) {
     peers.push_back(build_peer(entrant, model, results));
   std::vector<BuiltContactPeer> contact_peers;
   for (const ContactEntrant& entrant : kContactEntrants) {
+    if (input.is_smoke && entrant.resolution > 128) continue;
     const auto start = std::chrono::steady_clock::now();
     contact_peers.push_back({&entrant, entrant.build(model, probe.mesh)});
     const double passed_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();

@@ -235,6 +235,14 @@ class Smoke(FolderTest):
         self.assertLessEqual({"sqmap-layer2", "sqmap-layer3", "bricks-8bit-simd", "paper-layer2"},
                              {row["family"] for row in self.rows("budgets", model="brick")})
 
+    def test_voxels_tell_all_points_inside_and_few_more(self):
+        for row in self.rows("frames", peer="voxmap-pointshell-128"):
+            work = self.rows("works", model=row["model"], work=row["work"])[0]
+            self.assertGreaterEqual(row["answers_mean"], work["contacts_mean"], row)
+            self.assertLessEqual(row["answers_mean"], work["near_mean"] + work["contacts_mean"], row)
+        size = self.rows("peers", model="ball", peer="voxmap-pointshell-128")[0]["bytes"]
+        self.assertLess(size, 128 ** 3 / 4)  # what two bits a voxel would take without the tree
+
     def test_curves_are_as_long_in_x_as_in_y_and_every_figure_has_some(self):
         figures = {}
         for row in self.results["curves"]:
