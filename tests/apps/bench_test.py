@@ -4,6 +4,7 @@ form they promise. No test looks at a time.
 """
 import csv
 import json
+import math
 import os
 import re
 import shutil
@@ -43,6 +44,7 @@ Promise.all(figures.map(svg => new Promise((done, failed) => {
 }))).then(all => { document.getElementById("painted").textContent = JSON.stringify(all); });
 </script>"""
 COMPARE = ROOT / "scripts" / "bench_compare"
+TABLE = ROOT / "scripts" / "bench_table"
 TYPES = {"object": dict, "array": list, "string": str, "boolean": bool, "null": type(None)}
 
 
@@ -80,7 +82,7 @@ def violations(value, schema, root, where="$"):
                 yield f"{where}: {name} is not in the schema"
 
 
-class Smoke(FolderTest):
+class SmokeRun(FolderTest):
     """One smoke run over a sphere and a box, baked here; the probe is a sphere."""
 
     results = None
@@ -88,7 +90,7 @@ class Smoke(FolderTest):
 
     def setUp(self):
         super().setUp()
-        if Smoke.results is not None:
+        if SmokeRun.results is not None:
             return
         out = self.folder / "out"
         meshes = []
@@ -99,11 +101,15 @@ class Smoke(FolderTest):
         done = run("sqbench", "run", "all", "--smoke", "--meshes", *meshes, "--bundles", self.folder, "--probe", probe,
                    "-o", out)
         self.assert_exit(done, 0)
-        Smoke.files = {path.name: path.read_text(encoding="utf-8") for path in out.iterdir()}
-        Smoke.results = json.loads(Smoke.files["results.json"])
+        SmokeRun.files = {path.name: path.read_text(encoding="utf-8") for path in out.iterdir()}
+        SmokeRun.results = json.loads(SmokeRun.files["results.json"])
 
     def rows(self, table, **wanted):
         return [row for row in self.results[table] if all(row[key] == value for key, value in wanted.items())]
+
+
+class Smoke(SmokeRun):
+    """What the run found."""
 
     def test_results_fit_the_schema_that_is_shipped(self):
         schema = json.loads(SCHEMA.read_text(encoding="utf-8"))
@@ -346,6 +352,59 @@ class Smoke(FolderTest):
         self.assertIn("10.000", worse.stdout)
         self.assertEqual(better.stdout.count(" faster"), 1)
         self.assertEqual(compare(before, COMPARE).returncode, 4)
+
+
+class Table(SmokeRun):
+    """scripts/bench_table, on the results of the smoke run."""
+
+    def table(self, results, *arguments):
+        path = self.folder / "bench.json"
+        path.write_text(results if isinstance(results, str) else json.dumps(results), encoding="utf-8")
+        return subprocess.run([sys.executable, "-B", TABLE, path, *arguments], capture_output=True, text=True, check=False)
+
+    def test_cells_are_means_over_the_models(self):
+        made = self.table(self.results)
+        self.assertEqual(made.returncode, 0, made.stderr)
+        lines = {line.split(" | ")[0].strip("| "): line.strip("| ").split(" | ") for line in made.stdout.splitlines()}
+        cells = lines["**sqmap**, layer 3"]
+        touching, far = (math.sqrt(math.prod(row["us"]["median"] for row in self.rows("frames", work=work, peer="sqmap-layer3")))
+                         for work in ("touching", "far"))
+        wrong = [row["wrong_side_percent"] for row in self.rows("accuracy", peer="sqmap-layer3", shell_percent=3.0)]
+        self.assertAlmostEqual(float(cells[2]), touching, delta=0.006 * touching)
+        self.assertAlmostEqual(float(cells[4]), far, delta=0.006 * far)
+        self.assertAlmostEqual(float(cells[6].split()[0]), sum(wrong) / 2, delta=0.01)
+        self.assertEqual(lines["closest triangle (Embree)"][6], "0")
+        self.assertEqual(lines["OBB tree, all pairs (FCL)"][5:], ["-", "-", "-"])
+        self.assertIn(self.results["command"], made.stdout)
+
+    def test_another_time_changes_its_line_alone(self):
+        changed = json.loads(self.files["results.json"])
+        for row in changed["frames"]:
+            if row["peer"] == "sqmap-layer3" and row["work"] == "grasp":
+                row["us"]["median"] *= 3
+        before, after = (self.table(results).stdout.splitlines() for results in (self.results, changed))
+        differing = [line for line, other in zip(before, after) if line != other]
+        self.assertEqual(len(differing), 1)
+        self.assertIn("layer 3", differing[0])
+
+    def test_update_replaces_what_stands_between_the_marks(self):
+        page = self.folder / "page.md"
+        page.write_text("before\n<!-- bench_table -->\nold\n<!-- /bench_table -->\nafter\n", encoding="utf-8")
+        self.assertEqual(self.table(self.results, "--update", page).returncode, 0)
+        shown = self.table(self.results).stdout
+        self.assertEqual(page.read_text(encoding="utf-8"),
+                         f"before\n<!-- bench_table -->\n{shown}<!-- /bench_table -->\nafter\n")
+
+    def test_files_that_cannot_be_used_are_refused_and_left_alone(self):
+        page = self.folder / "page.md"
+        page.write_text("no marks", encoding="utf-8")
+        for results, words in (("words", "no JSON"), ({"schema": "other"}, "sqmap.bench/1"),
+                               ({**self.results, "frames": []}, "run sqbench with all suites"),
+                               (self.results, "<!-- bench_table -->")):
+            refused = self.table(results, "--update", page)
+            self.assertEqual(refused.returncode, 4)
+            self.assertIn(words, refused.stderr)
+        self.assertEqual(page.read_text(encoding="utf-8"), "no marks")
 
 
 class Refusals(FolderTest):
