@@ -352,6 +352,12 @@ class Smoke(SmokeRun):
         self.assertIn("10.000", worse.stdout)
         self.assertEqual(better.stdout.count(" faster"), 1)
         self.assertEqual(compare(before, COMPARE).returncode, 4)
+        slower = json.loads(self.files["results.json"])
+        slower["budgets"][0]["mean_error_percent"] *= 2
+        after.write_text(json.dumps(slower), encoding="utf-8")
+        less_accurate = compare(before, after)
+        self.assertEqual(less_accurate.returncode, 1)
+        self.assertEqual(less_accurate.stdout.count(" worse"), 1)
 
 
 class Table(SmokeRun):
