@@ -62,8 +62,6 @@ Exit write_all(Console& console, const std::filesystem::path& folder, const benc
   for (const auto& [name, text] : files)
     if (const Outcome written = write_file(folder / name, text); !written)
       return report(console, folder / name, written.error());
-  console.out(fmt::format("{}: {} files, the page is {}\n", folder.string(), files.size(),
-                          (folder / "index.html").string()));
   return Exit::kOk;
 }
 
@@ -86,10 +84,14 @@ Exit run_suites(Console& console, const RunArguments& arguments) {
     input.models.push_back(std::move(model.value()));
   }
   results.machine = bench::this_machine(bench::pin_thread());
-  for (const bench::Suite& suite : kSuites)
-    if (arguments.suite == "all" || arguments.suite == suite.name) suite.run(input, results);
-  const Exit written = write_all(console, arguments.out, results);
-  if (written != Exit::kOk) return written;
+  for (const bench::Suite& suite : kSuites) {
+    if (arguments.suite != "all" && arguments.suite != suite.name) continue;
+    suite.run(input, results);
+    // After each, so that hours are not lost to what befalls a later one.
+    const Exit written = write_all(console, arguments.out, results);
+    if (written != Exit::kOk) return written;
+  }
+  console.out(fmt::format("the page is {}\n", (arguments.out / "index.html").string()));
   std::size_t broken = 0;
   for (const bench::CheckRow& check : results.checks) {
     if (check.holds) continue;

@@ -97,6 +97,7 @@ std::optional<Model> bake_within(const Model& model, double budget_bytes, bool i
   bake::BakeOptions options;
   options.set(bake::Quality::kFine);
   options.max_error_percent = is_smoke ? 0.5 : 0.005;  // the limit is to be the memory
+  if (is_smoke) options.sample_count = 2000;
   for (double share = 0.9; share > 0.3; share *= 0.8) {
     options.max_bytes = static_cast<std::uint64_t>(share * budget_bytes);
     options.max_parts = static_cast<std::uint32_t>(std::clamp(share * budget_bytes / 2048, 2.0, 48.0));

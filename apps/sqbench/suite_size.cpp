@@ -82,8 +82,10 @@ void run_objects(const SuiteInput& input, Results& results) {
     const bake::Mesh mesh = wavy_ball(subdivisions);
     const auto faces = static_cast<double>(mesh.faces.size());
     input.note(fmt::format("size: object of {} faces", mesh.faces.size()));
+    bake::BakeOptions options;
+    if (input.is_smoke) options.max_error_percent = 1, options.sample_count = 2000;
     auto start = std::chrono::steady_clock::now();
-    const Model model = baked_model("wavy ball", mesh, {});
+    const Model model = baked_model("wavy ball", mesh, options);
     builds.add("sqmap: bake", faces, seconds_since(start));
     const Probe probe = scaled_probe(input.probe, model);
     const Sequence sequence = make_sequence(model, probe, Contact::kTouching, input.is_smoke ? 2 : 6);
