@@ -67,7 +67,7 @@ Exit run_bake(Console& console, const BakeArguments& arguments) {
     keep_shard(list.value(), shard.value());
   }
   if (arguments.dry_run) {
-    print_plan(console, list.value(), arguments.format);
+    print_plan(console, list.value(), arguments);
     return Exit::kOk;
   }
   if (const Outcome ok = check_report(arguments.report); !ok) return refuse(ok.error());
@@ -144,7 +144,7 @@ void add_run_options(CLI::App& app, BakeArguments& arguments) {
                  "is set to nothing)")
       ->type_name("DIR");
   app.add_flag("!--no-cache", arguments.use_cache, "Bake all; neither read nor fill the cache");
-  app.add_flag("--explain", arguments.explain, "Say why each mesh is baked, or is not");
+  app.add_flag("--explain", arguments.explain, "Say why each mesh is baked, or is not; with -n, would be");
   app.add_option("--report", arguments.report, "Write a page of the run, as `sqbake report` makes it")
       ->type_name("FILE.html");
   app.add_option("--depfile", arguments.depfile, "Write the files read, as a rule for make and ninja")

@@ -9,10 +9,9 @@
 
 #include <fmt/format.h>
 
-#include "sqmap/bake/version.hpp"
-
 #include "../common/files.hpp"
 #include "depfile.hpp"
+#include "job_cache.hpp"
 #include "record_json.hpp"
 #include "stop_signals.hpp"
 #include "worker_pool.hpp"
@@ -41,23 +40,6 @@ RecordWriter::Options writer_options(const BakeArguments& arguments, const JobLi
   return {arguments.format, arguments.quiet, arguments.verbose, list.single_file, width};
 }
 
-/// All that decides the bytes of a bundle but the files that are read. Limits do not: what runs into them is
-/// not kept.
-BakeIdentity identity_of(const Job& job) {
-  const AssetOptions options = options_from(texts_of(job.settings)).value();  // checked when it was listed
-  return {options.bake.to_json(), bake::algorithm_version()};
-}
-
-std::optional<BundleCache> open_cache(const BakeArguments& arguments) {
-  // Neither a check of the baker nor its debugging has a use for what was baked before.
-  if (!arguments.use_cache || arguments.verify_determinism || arguments.no_isolation) return std::nullopt;
-  if (!arguments.cache.empty()) return BundleCache(arguments.cache);
-  if (const char* given = std::getenv("SQMAP_CACHE_DIR"); given != nullptr && *given == '\0')
-    return std::nullopt;
-  if (auto folder = BundleCache::default_folder()) return BundleCache(*std::move(folder));
-  return std::nullopt;
-}
-
 BakeRecord cancelled(const char* finding) {
   BakeRecord record;
   record.verdict = Verdict::kCancelled;
@@ -82,7 +64,10 @@ BakeRun::BakeRun(Console& console, const BakeArguments& arguments, JobList list)
 }
 
 void BakeRun::take_from_cache() {
-  if (!cache_) return;
+  if (!cache_) {
+    if (arguments_.explain) console_.note(kNoCache);
+    return;
+  }
   std::deque<Attempt> missed;
   for (const Attempt& attempt : queue_) {
     const std::size_t index = attempt.index;
@@ -90,7 +75,7 @@ void BakeRun::take_from_cache() {
     const Clock::time_point start = Clock::now();
     const WriteGuard guard;
     if (stop_signal() != 0) return;
-    CacheAnswer answer = cache_->lookup({job.input, job.output, identity_of(job)});
+    CacheAnswer answer = cache_->lookup(cache_request(job));
     if (arguments_.explain)
       for (const std::string& reason : answer.reasons) console_.note(job.name + ": " + reason);
     Result<BakeRecord> record = Error{Status::kBadOption, "", ""};

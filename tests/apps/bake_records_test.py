@@ -50,9 +50,10 @@ class Records(FolderTest):
                    "-j1")
         self.assertEqual([self.valid(line).get("outcome") for line in late.stdout.splitlines()],
                          ["timeout"] + 3 * ["cancelled"] + [None])
-        for line in run("sqbake", "bake", self.models, *options, "-n", "--format", "ndjson").stdout.splitlines():
-            self.valid(line)
-        self.valid(run("sqbake", "bake", self.models, *options, "-n", "--format", "json").stdout)
+        for dry in (["-n"], ["-n", "--explain"]):
+            for line in run("sqbake", "bake", self.models, *options, *dry, "--format", "ndjson").stdout.splitlines():
+                self.valid(line)
+            self.valid(run("sqbake", "bake", self.models, *options, *dry, "--format", "json").stdout)
 
     def test_the_schema_refuses_what_is_no_record(self):
         good = self.valid(run("sqbake", "bake", self.models / "ball.off", *ROUGH, "-o", self.folder / "a.h5", "--format",

@@ -7,6 +7,8 @@ import unittest
 
 from support import FolderTest, ROUGH, box, run, sphere, write_off
 
+from bake_build_test import write_gltf, write_obj
+
 
 class Cache(FolderTest):
     def setUp(self):
@@ -53,6 +55,66 @@ class Cache(FolderTest):
         self.assertRegex(self.stderr, r"ball 1.off: option \S*max.parts\S*: \S*3\S*, was \S*24")
         self.assertEqual(self.baked("--unit", "mm"), names)
         self.assertEqual(self.baked(), [])
+
+    def test_materials_and_buffers_count_and_textures_do_not(self):
+        shutil.rmtree(self.models)
+        self.models.mkdir()
+        write_obj(self.models / "red.obj", sphere(1), "red.mtl")
+        write_gltf(self.models / "box.gltf", box(), "box.bin")
+        (self.models / "skin.png").write_bytes(b"one")
+        material = "newmtl red\nmap_Kd skin.png\n"
+        (self.models / "red.mtl").write_text(material, encoding="ascii")
+        self.assertEqual(self.baked(), ["box.gltf", "red.obj"])
+        (self.models / "skin.png").write_bytes(b"another")
+        self.assertEqual(self.baked(), [])
+        (self.models / "red.mtl").write_text(material + "Kd 1 0 0\n", encoding="ascii")
+        self.assertEqual(self.baked(), ["red.obj"])
+        self.assertIn("red.obj: file red.mtl changed", self.stderr)
+        before = self.bundles()["box.h5"]
+        write_gltf(self.models / "elsewhere.gltf", box(2, 2, 3), "box.bin")  # other numbers in the same buffer
+        (self.models / "elsewhere.gltf").unlink()
+        self.assertEqual(self.baked(), ["box.gltf"])
+        self.assertIn("box.gltf: file box.bin changed", self.stderr)
+        self.assertNotEqual(self.bundles()["box.h5"], before)
+
+    def foretold(self, *options):
+        """What -n --explain says would be baked; that it writes nothing."""
+        files = lambda: {p: (p.stat().st_mtime_ns, p.stat().st_ino) for p in self.folder.rglob("*")}
+        before = files()
+        result = run("sqbake", "bake", self.models, "--out-dir", self.out, "--cache", self.cache, "-n", "--explain",
+                     "--format", "ndjson", *ROUGH, *options)
+        self.assert_exit(result, 0)
+        self.stderr = result.stderr
+        self.assertEqual(files(), before)
+        records = [json.loads(line) for line in result.stdout.splitlines()]
+        names = sorted(os.path.basename(r["input"]) for r in records if not r["cached"])
+        self.assertIn(f"{len(names)} of {len(records)} would be baked", self.stderr)
+        for record in records:
+            for reason in record["reasons"]:
+                self.assertIn(reason, self.stderr)
+        return names
+
+    def test_a_dry_run_foretells_what_is_baked_and_why(self):
+        names = [f"ball {k}.off" for k in range(4)]
+        self.assertEqual(self.foretold(), names)
+        self.assertIn("no earlier bake", self.stderr)
+        self.bake()
+        self.assertEqual(self.foretold(), [])
+        self.assertIn("up to date", self.stderr)
+        (self.out / "ball 3.h5").unlink()
+        write_off(self.models / "ball 2.off", box())
+        self.assertEqual(self.foretold(), ["ball 2.off"])
+        self.assertIn("ball 2.off: mesh ball 2.off changed", self.stderr)
+        self.assertIn("ball 3.off: the cache has it", self.stderr)
+        self.assertEqual(self.foretold("--max-parts", "2"), names)
+        self.assertRegex(self.stderr, r"option \S*max.parts\S*: \S*2\S*, was \S*24")
+        self.assertEqual(self.baked(), ["ball 2.off"])
+        self.assertEqual(self.foretold("--no-cache"), names)
+        for path in (self.cache / "v1" / "objects").rglob("*"):
+            if path.is_file():
+                path.unlink()
+        (self.out / "ball 1.h5").unlink()
+        self.assertEqual(self.foretold(), ["ball 1.off"])
 
     def test_a_hit_has_the_bytes_and_the_record_of_a_cold_bake_without_cache(self):
         self.bake()

@@ -69,21 +69,21 @@ std::vector<std::string> miss_reasons(const std::optional<OutputRecord>& last, c
   return lines;
 }
 
-/// Brings `output` to the contents of an object. Empty: it could not.
-std::optional<bool> bring(const CacheStore& store, const fs::path& output,
-                          const std::optional<OutputRecord>& last, OutputRecord& now) {
+/// Whether `output` has the contents of the object already.
+bool is_current(const fs::path& output, const std::optional<OutputRecord>& last, OutputRecord& now) {
   if (last && last->object == now.object && last->bundle_stamp && stamp_of(output) == last->bundle_stamp) {
     now.bundle_stamp = last->bundle_stamp;
-    return false;
+    return true;
   }
-  if (const std::optional<HashedFile> held = hash_file(output); held && held->hash == now.object) {
-    if (held->is_settled) now.bundle_stamp = held->stamp;
-    return false;
-  }
-  const std::optional<std::vector<std::uint8_t>> bytes = store.object(now.object);
-  if (!bytes || !replace_file(output, *bytes, true)) return std::nullopt;
+  const std::optional<HashedFile> held = hash_file(output);
+  if (!held || held->hash != now.object) return false;
+  if (held->is_settled) now.bundle_stamp = held->stamp;
   return true;
 }
+
+constexpr const char* kUnusable =
+    "the cache's copy of the bundle is damaged, missing or cannot be written to the output";
+constexpr const char* kUpToDate = "nothing to do: the output is up to date";
 
 Error changed(const std::string& name) {
   return {Status::kInvalidMesh,
@@ -103,20 +103,30 @@ std::optional<fs::path> BundleCache::default_folder() {
   return std::nullopt;
 }
 
-CacheAnswer BundleCache::lookup(const CacheRequest& request) const {
-  CacheAnswer answer;
+/// What the cache holds for a request, before anything is made of it.
+struct BundleCache::Found {
+  CacheAnswer answer;  ///< of a hit: the differences to the last bake and the record, not yet is_hit
+  std::optional<OutputRecord> last;
+  OutputRecord now;  ///< with an object when a result was found
+  std::string key;
+};
+
+BundleCache::Found BundleCache::find(const CacheRequest& request) const {
+  Found found;
+  CacheAnswer& answer = found.answer;
   answer.ticket = {request, "", now_ns()};
-  const std::optional<OutputRecord> last = store_.output_record(request.output);
+  found.last = store_.output_record(request.output);
+  const std::optional<OutputRecord>& last = found.last;
   const std::string name = request.mesh.filename().string();
   const BakeInput mesh = look_at(request.mesh, name, last_input(last, name));
   if (mesh.hash.empty()) {
     answer.reasons = {"the mesh cannot be read"};
-    return answer;
+    return found;
   }
   answer.ticket.mesh_hash = mesh.hash;
 
-  std::string key = key_of_mesh(mesh, request.identity);
-  std::optional<CacheResult> result = store_.result(key);
+  found.key = key_of_mesh(mesh, request.identity);
+  std::optional<CacheResult> result = store_.result(found.key);
   std::vector<std::string> side_names;
   if (result) {
     side_names = result->side_files;
@@ -127,29 +137,48 @@ CacheAnswer BundleCache::lookup(const CacheRequest& request) const {
   for (const std::string& side : side_names)
     inputs.push_back(look_at(request.mesh.parent_path() / side, side, last_input(last, side)));
   if (result && !side_names.empty()) {
-    key = key_with_side_files(key, std::span(inputs).subspan(1));
-    result = store_.result(key);
+    found.key = key_with_side_files(found.key, std::span(inputs).subspan(1));
+    result = store_.result(found.key);
   }
-  OutputRecord now = output_record(request.identity, std::move(inputs));
+  found.now = output_record(request.identity, std::move(inputs));
   if (!result || result->object.empty()) {
-    answer.reasons = miss_reasons(last, now);
-    return answer;
+    answer.reasons = miss_reasons(last, found.now);
+    return found;
   }
+  found.now.object = result->object;
+  answer.record_json = std::move(result->record_json);
+  if (last) answer.reasons = differences(*last, found.now);
+  return found;
+}
 
-  now.object = result->object;
-  const std::optional<bool> written = bring(store_, request.output, last, now);
-  if (!written) {
-    answer.reasons = {
-        "the cache's copy of the bundle is damaged, missing or cannot be written to the output"};
-    return answer;
+CacheAnswer BundleCache::lookup(const CacheRequest& request) const {
+  auto [answer, last, now, key] = find(request);
+  if (now.object.empty()) return answer;
+  if (!is_current(request.output, last, now)) {
+    const std::optional<std::vector<std::uint8_t>> bytes = store_.object(now.object);
+    if (!bytes || !replace_file(request.output, *bytes, true)) {
+      answer.reasons = {kUnusable};
+      return answer;
+    }
+    answer.output_written = true;
   }
   answer.is_hit = true;
-  answer.output_written = *written;
-  answer.record_json = std::move(result->record_json);
-  if (last) answer.reasons = differences(*last, now);
-  answer.reasons.emplace_back(*written ? "copied from the cache" : "nothing to do: the output is up to date");
+  answer.reasons.emplace_back(answer.output_written ? "copied from the cache" : kUpToDate);
   store_.mark_used(key);
   if (last != now) std::ignore = store_.put_output_record(request.output, now);  // costs time, not truth
+  return answer;
+}
+
+CacheAnswer BundleCache::peek(const CacheRequest& request) const {
+  auto [answer, last, now, key] = find(request);
+  if (now.object.empty()) return answer;
+  const bool is_up_to_date = is_current(request.output, last, now);
+  answer.is_hit = is_up_to_date || store_.object(now.object);
+  if (!answer.is_hit) {
+    answer.reasons = {kUnusable};
+  } else {
+    answer.reasons.emplace_back(is_up_to_date ? kUpToDate : "the cache has it");
+  }
   return answer;
 }
 

@@ -67,6 +67,10 @@ class BundleCache {
   /// WriteGuard.
   CacheAnswer lookup(const CacheRequest& request) const;
 
+  /// What lookup() would answer now. Writes no output and records nothing; of the cache it removes what is
+  /// damaged.
+  CacheAnswer peek(const CacheRequest& request) const;
+
   /// Stores the bundle that was baked to ticket.request.output, after a miss.
   ///
   /// @param side_files   files beside the mesh that its import opened or looked for, also those it missed
@@ -78,6 +82,9 @@ class BundleCache {
                   const std::string& record_json) const;
 
  private:
+  struct Found;
+  Found find(const CacheRequest& request) const;
+
   CacheStore store_;
 };
 
