@@ -18,6 +18,8 @@ from support import ROUGH, TIMEOUT_S, FolderTest, box, command, run, sphere, wri
 
 from bake_isolation_test import bent, children, until
 
+FOREIGN = Path("/usr/share/assimp/models")
+
 
 def write_obj(path, mesh, material=None):
     lines = [f"mtllib {material}"] if material else []
@@ -109,6 +111,24 @@ class Depfile(FolderTest):
                   for name in ("a $b#c.off", "plain.obj", "red.obj", "lost.obj", "inside.gltf", "beside.gltf")}
         self.assertEqual(counts, {"a $b#c.off": 1, "plain.obj": 1, "red.obj": 2, "lost.obj": 1, "inside.gltf": 1,
                                   "beside.gltf": 2})
+
+    @unittest.skipUnless(FOREIGN.is_dir(), "needs assimp-testmodels")
+    def test_it_names_buffers_and_materials_and_no_texture_whatever_the_format(self):
+        write_obj(self.models / "painted.obj", sphere(1), "painted.mtl")
+        (self.models / "painted.mtl").write_text("newmtl red\nmap_Kd skin.png\n", encoding="ascii")
+        (self.models / "skin.png").write_bytes(b"no picture: nobody looks")
+        for source in ("glTF2/BoxTextured-glTF", "glTF2/BoxTextured-glTF-Binary", "Collada/cube_triangulate.dae",
+                       "FBX/box.fbx", "3MF/box.3mf", "STL/triangle.stl"):
+            source = FOREIGN / source
+            for file in source.iterdir() if source.is_dir() else [source]:
+                shutil.copy(file, self.models)
+        pictures = [file for file in self.models.iterdir() if file.suffix == ".png"]
+        self.assertGreater(len(pictures), 1, "no texture is there to be left alone")
+        for mesh, *others in (("painted.obj", "painted.mtl"), ("BoxTextured.gltf", "BoxTextured0.bin"),
+                              ("BoxTextured.glb",), ("cube_triangulate.dae",), ("box.fbx",), ("box.3mf",),
+                              ("triangle.stl",)):
+            with self.subTest(mesh=mesh):
+                self.assertEqual({Path(name).name for name in self.check(self.models / mesh)}, {mesh, *others})
 
     def test_it_names_the_files_of_the_settings(self):
         write_off(self.models / "a.off", box())
