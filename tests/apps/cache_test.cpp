@@ -125,6 +125,34 @@ TEST_F(Cache, LeavesAnOutputThatIsRightUntouched) {
   EXPECT_EQ(stamp_of(output()), before);
 }
 
+TEST_F(Cache, APeekAnswersAsALookupWouldAndWritesNothing) {
+  const auto state = [this] {
+    std::vector<std::pair<fs::path, std::optional<FileStamp>>> files;
+    for (const fs::path& path : files_in(folder_)) files.emplace_back(path, stamp_of(path));
+    return files;
+  };
+  const auto before = state();
+  EXPECT_FALSE(cache().peek(request()).is_hit);
+  EXPECT_EQ(state(), before);
+  ask(request());
+  fs::remove(output());
+  const auto gone = state();
+  const CacheAnswer held = cache().peek(request());
+  EXPECT_TRUE(held.is_hit);
+  EXPECT_FALSE(held.output_written);
+  EXPECT_TRUE(mentions(held.reasons, "the cache has it"));
+  EXPECT_EQ(state(), gone);
+  EXPECT_TRUE(ask(request()));
+  const CacheAnswer current = cache().peek(request());
+  EXPECT_TRUE(current.is_hit);
+  EXPECT_TRUE(mentions(current.reasons, "up to date"));
+
+  write_text(mesh(), "another mesh");
+  const CacheAnswer changed = cache().peek(request());
+  EXPECT_FALSE(changed.is_hit);
+  EXPECT_TRUE(mentions(changed.reasons, "mesh a.off changed"));
+}
+
 TEST_F(Cache, TouchingFilesChangesNothing) {
   ask(request());
   write_text(mesh(), text_of(mesh()));
