@@ -256,7 +256,8 @@ HWY_NOINLINE void Walker::seek(const Lost& lost, const Rings& rings) noexcept {
       const V step = all(static_cast<float>(looker_.stride() << ring));
       for (int k = 0; k < 9; ++k) {
         if (k == 4) continue;  // the middle
-        const V here_row = mid_row + all(static_cast<float>(k / 3 - 1)) * step;
+        const int rows_up = k / 3 - 1;
+        const V here_row = mid_row + all(static_cast<float>(rows_up)) * step;
         V here_col = mid_col + all(static_cast<float>(k % 3 - 1)) * step;
         here_col = pick(hn::Lt(here_col, zero), here_col + turn, here_col);
         here_col = pick(hn::Lt(here_col, turn), here_col, here_col - turn);

@@ -222,7 +222,7 @@ TEST(Body, HoldsEveryPointInABlockOfNeighbours) {
   const PointBody body = built(points);
   EXPECT_EQ(body.point_count(), points.size());
   EXPECT_GE(body.resident_bytes(), 16 * points.size());
-  EXPECT_LE(body.resident_bytes(), 16 * points.size() + 16 * 160 + 1024);
+  EXPECT_LE(body.resident_bytes(), 16 * (points.size() + 160) + 1024);
   float most = 0;
   for (const Vec3f& p : points) most = std::max(most, norm(p - body.sphere_centre_m()));
   EXPECT_GE(body.sphere_radius_m(), most);
