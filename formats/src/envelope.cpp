@@ -41,12 +41,12 @@ std::string version_text(std::uint32_t major, std::uint32_t minor) {
 
 }  // namespace
 
-void seal(std::span<std::uint8_t> bundle) {
+void seal(std::span<std::uint8_t> bundle, std::uint32_t minor) {
   const std::uint64_t length = bundle.size();
   std::fill_n(bundle.begin(), kEnvelopeBytes, std::uint8_t{0});
   std::copy(kMagic.begin(), kMagic.end(), bundle.begin());
   std::memcpy(bundle.data() + kMajorAt, &kFormatMajor, 4);
-  std::memcpy(bundle.data() + kMinorAt, &kFormatMinor, 4);
+  std::memcpy(bundle.data() + kMinorAt, &minor, 4);
   std::memcpy(bundle.data() + kLengthAt, &length, 8);
   const Digest digest = digest_of(bundle);
   std::copy(digest.begin(), digest.end(), bundle.begin() + kDigestAt);

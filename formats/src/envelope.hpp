@@ -22,9 +22,9 @@ namespace sqmap::io {
 /// HDF5 1.10 crashes or hangs on some damaged files; no damaged byte gets past this digest to it.
 inline constexpr std::size_t kEnvelopeBytes = 512;
 
-/// Fills the first kEnvelopeBytes of a bundle whose other bytes are final. Precondition: it is at least that
-/// long.
-void seal(std::span<std::uint8_t> bundle);
+/// Fills the first kEnvelopeBytes of a bundle of version kFormatMajor.minor whose other bytes are final.
+/// Precondition: it is at least that long.
+void seal(std::span<std::uint8_t> bundle, std::uint32_t minor);
 
 /// Errors: kInvalidAsset (no bundle, cut short, bytes appended, damaged), kUnsupportedVersion.
 Outcome check_envelope(std::span<const std::uint8_t> bundle);

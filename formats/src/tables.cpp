@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tables.hpp"
 
+#include <algorithm>
 #include <bit>
 #include <cmath>
 #include <cstring>
@@ -107,6 +108,20 @@ void put_map(Document& document, const DistanceMap& map) {
   }
 }
 
+bool has_bounds(const Asset& asset) {
+  return std::any_of(asset.parts.begin(), asset.parts.end(),
+                     [](const Part& part) { return part.bounds.cells > 0; });
+}
+
+void put_bounds(Document& document, const SurfaceBounds& bounds) {
+  put(document.tables[kBoundCells], bounds.cells);
+  put(document.tables[kBoundTolerance], bounds.tolerance_m);
+  for (const BoundCell& cell : bounds.cell)
+    for (const std::uint8_t value :
+         {cell.tilt_u, cell.tilt_v, cell.outer, cell.upper, cell.lower, cell.sides})
+      put(document.tables[kBounds], value);
+}
+
 std::size_t row_count(const Document& document, TableId id) {
   return document.tables[id].size() / (element_bytes(kTables[id].element) * kTables[id].columns);
 }
@@ -134,6 +149,12 @@ Layout layout_of(const Document& document, std::size_t part) {
   return {value(0), value(1), value(2), value(3), value(4), value(5), value(6)};
 }
 
+/// Rows of /maps/bounds that a part has; 2^32 squared would wrap.
+std::uint64_t bound_rows(std::uint32_t cells) {
+  const std::uint64_t side = cells;
+  return side > 0xFFFF ? std::uint64_t{0xFFFFFFFF} : 6 * side * side;
+}
+
 // The part tables agree on the number of parts, and the maps add up to the map tables.
 Outcome check_shapes(const Document& document) {
   const std::size_t part_count = row_count(document, kSemiAxes);
@@ -159,6 +180,15 @@ Outcome check_shapes(const Document& document) {
     crossings += layout.crossing_count;
     samples += layout.vertex_count;
   }
+  const bool bounded = row_count(document, kBoundCells) > 0;
+  std::uint64_t bound_cells = 0;
+  for (std::size_t part = 0; bounded && part < std::min(part_count, row_count(document, kBoundCells)); ++part)
+    bound_cells += bound_rows(get<std::uint32_t>(document.tables[kBoundCells], part));
+  const std::size_t bounded_parts = bounded ? part_count : 0;
+  for (const TableId id : {kBoundCells, kBoundTolerance})
+    if (Outcome same = require_rows(document, id, bounded_parts, "/maps/bound_cells"); !same) return same;
+  if (Outcome same = require_rows(document, kBounds, bound_cells, "/maps/bound_cells"); !same) return same;
+
   const std::pair<TableId, std::uint64_t> required[] = {{kCode, texels},
                                                         {kStartInside, start_bytes},
                                                         {kCrossingTexel, crossings},
@@ -173,7 +203,7 @@ Outcome check_shapes(const Document& document) {
 
 // Where the next part's share of each concatenated map table begins.
 struct Cursor {
-  std::size_t texel{}, start_byte{}, crossing{}, sample{};
+  std::size_t texel{}, start_byte{}, crossing{}, sample{}, bound{};
 };
 
 Outcome get_map(const Document& document, std::size_t part, Cursor& at, DistanceMap& map) {
@@ -214,6 +244,21 @@ Outcome get_map(const Document& document, std::size_t part, Cursor& at, Distance
   at.crossing += layout.crossing_count;
   at.sample += layout.vertex_count;
   return Done{};
+}
+
+SurfaceBounds get_bounds(const Document& document, std::size_t part, Cursor& at) {
+  SurfaceBounds bounds;
+  if (document.tables[kBoundCells].empty()) return bounds;
+  bounds.cells = get<std::uint32_t>(document.tables[kBoundCells], part);
+  bounds.tolerance_m = get<double>(document.tables[kBoundTolerance], part);
+  const std::size_t rows = bound_rows(bounds.cells);
+  bounds.cell.reserve(rows);
+  for (std::size_t i = at.bound; i < at.bound + rows; ++i) {
+    const std::uint8_t* row = &document.tables[kBounds][i * kTables[kBounds].columns];
+    bounds.cell.push_back({row[0], row[1], row[2], row[3], row[4], row[5]});
+  }
+  at.bound += rows;
+  return bounds;
 }
 
 Part get_part(const Document& document, std::size_t index) {
@@ -276,6 +321,8 @@ std::string path_of(const ArraySpec& spec) {
   return path + spec.name;
 }
 
+std::uint32_t minor_version(const Asset& asset) noexcept { return has_bounds(asset) ? 1 : 0; }
+
 Document to_document(const Asset& asset) {
   Document document;
   for (const auto& [id, text] : kFixedTexts) document.text[id] = text;
@@ -283,7 +330,7 @@ Document to_document(const Asset& asset) {
 
   auto& numbers = document.numbers;
   put(numbers[kVersionPair], kFormatMajor);
-  put(numbers[kVersionPair], kFormatMinor);
+  put(numbers[kVersionPair], minor_version(asset));
   put(numbers[kMetresPerUnit], asset.provenance.metres_per_unit);
   put(numbers[kRMax], asset.r_max_m);
   put(numbers[kAssetSphere], asset.sphere);
@@ -293,6 +340,7 @@ Document to_document(const Asset& asset) {
   put(numbers[kMeshVolume], asset.mesh.volume_m3);
 
   auto& tables = document.tables;
+  const bool bounded = has_bounds(asset);
   for (const Part& part : asset.parts) {
     put(tables[kSemiAxes], part.shape.semi_axes_m);
     put(tables[kExponents], part.shape.e1);
@@ -307,6 +355,7 @@ Document to_document(const Asset& asset) {
     put(tables[kVertexCount], part.vertex_count);
     put(tables[kFaceCount], part.face_count);
     put_map(document, part.map);
+    if (bounded) put_bounds(document, part.bounds);
   }
   for (const std::uint16_t label : asset.face_labels) put(tables[kFaceLabels], label);
   for (const ErrorRow& row : asset.errors)
@@ -352,6 +401,7 @@ Result<Asset> to_asset(const Document& document) {
   for (std::size_t i = 0; i < row_count(document, kSemiAxes); ++i) {
     asset.parts.push_back(get_part(document, i));
     if (Outcome map = get_map(document, i, cursor, asset.parts.back().map); !map) return map.error();
+    asset.parts.back().bounds = get_bounds(document, i, cursor);
   }
   const Bytes& labels = document.tables[kFaceLabels];
   asset.face_labels.resize(labels.size() / 2);

@@ -50,6 +50,9 @@ enum TableId : std::size_t {
   kVertexCode,
   kFaceLabels,
   kErrors,
+  kBoundCells,
+  kBoundTolerance,
+  kBounds,
   kTableCount
 };
 inline constexpr std::array<ArraySpec, kTableCount> kTables{{
@@ -74,6 +77,9 @@ inline constexpr std::array<ArraySpec, kTableCount> kTables{{
     {"maps", "vertex_code", Element::kU16, 1},
     {"", "face_labels", Element::kU16, 1},
     {"", "errors", Element::kF64, 10},
+    {"maps", "bound_cells", Element::kU32, 1},
+    {"maps", "bound_tolerance_m", Element::kF64, 1},
+    {"maps", "bounds", Element::kU8, 6},
 }};
 
 /// Attributes of numbers, in the order of the content hash.
@@ -135,6 +141,9 @@ struct Document {
 
 /// "/maps/code".
 std::string path_of(const ArraySpec& spec);
+
+/// The earliest minor version that has all that the asset holds (FORMAT.md section 9).
+std::uint32_t minor_version(const Asset& asset) noexcept;
 
 /// Precondition: the asset breaks no rule of validate(asset, kFull).
 Document to_document(const Asset& asset);

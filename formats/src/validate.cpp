@@ -80,6 +80,7 @@ class Checker {
     for (part_ = 0; part_ < asset_.parts.size(); ++part_) {
       const Part& part = asset_.parts[part_];
       check_part(part);
+      check_bounds(part.bounds, level);
       const std::size_t before = findings_.size();
       check_grid(part.map);
       // What follows indexes by the grid.
@@ -246,6 +247,24 @@ class Checker {
                        ", must be above the one before and below " + std::to_string(cells));
       break;
     }
+  }
+
+  void check_bounds(const SurfaceBounds& bounds, CheckLevel level) {
+    const bool cells = bounds.cells <= SurfaceBounds::kMostCells &&
+                       bounds.cell.size() == std::size_t{6} * bounds.cells * bounds.cells;
+    require_part(cells && is_length(bounds.tolerance_m), 39,
+                 std::to_string(bounds.cell.size()) + " bounds, bound_cells = " +
+                     std::to_string(bounds.cells) + ", bound_tolerance_m = " + text(bounds.tolerance_m) +
+                     ", must be 6 bound_cells^2 bounds, at most " +
+                     std::to_string(SurfaceBounds::kMostCells) + " cells and a length");
+    if (!cells || level != CheckLevel::kFull) return;
+    const auto contradicts = std::find_if(bounds.cell.begin(), bounds.cell.end(), [](const BoundCell& cell) {
+      const bool has_second = cell.lower <= cell.upper;
+      return cell.sides > 3 || (has_second && cell.upper > cell.outer);
+    });
+    require_part(contradicts == bounds.cell.end(), 57,
+                 "the bounds of cell " + std::to_string(contradicts - bounds.cell.begin()) +
+                     " must have `upper` at most `outer` and no bit of `sides` but the two lowest");
   }
 
   void check_asset_fully() {

@@ -149,7 +149,7 @@ Result<std::vector<std::uint8_t>> encode(const Asset& asset) {
   std::uint64_t end;  // the image grows in steps of kGrowBytes; the file ends where its superblock says
   std::memcpy(&end, image.data() + kEofAt, sizeof end);
   image.resize(end);
-  seal(image);
+  seal(image, minor_version(asset));
   return image;
 }
 

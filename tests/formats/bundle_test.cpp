@@ -20,6 +20,7 @@
 namespace sqmap {
 namespace {
 
+using test::bounded_asset;
 using test::Bytes;
 using test::identical;
 using test::rich_asset;
@@ -46,6 +47,26 @@ TEST(Bundle, RoundTripKeepsAnAssetThatHasOnlyWhatItMust) {
   const auto decoded = io::decode(encoded(asset));
   ASSERT_TRUE(decoded) << decoded.error().finding;
   EXPECT_TRUE(identical(decoded.value(), asset));
+}
+
+TEST(Bundle, RoundTripKeepsBounds) {
+  const auto decoded = io::decode(encoded(bounded_asset()));
+  ASSERT_TRUE(decoded) << decoded.error().finding;
+  EXPECT_TRUE(identical(decoded.value(), bounded_asset()));
+  EXPECT_FALSE(identical(decoded.value(), rich_asset()));
+}
+
+// What has no bounds is a bundle of version 1.0, for readers that know no other.
+TEST(Bundle, HasTheEarliestVersionThatHoldsIt) {
+  for (const std::uint32_t minor : {0U, 1U}) {
+    const Bytes bytes = encoded(minor == 0 ? rich_asset() : bounded_asset());
+    std::uint32_t found = 9;
+    std::memcpy(&found, bytes.data() + 12, 4);
+    EXPECT_EQ(found, minor);
+    const auto sizes = io::stored_bytes(bytes);
+    ASSERT_TRUE(sizes);
+    EXPECT_EQ(sizes.value().back().name, minor == 0 ? "/errors" : "/maps/bounds");
+  }
 }
 
 // Noise of every bit depth: what no prediction helps with must come back too.
@@ -169,6 +190,15 @@ TEST(Bundle, GoldenBundleOfVersion1_0Loads) {
   const auto decoded = io::decode(bytes);
   ASSERT_TRUE(decoded) << decoded.error().finding;
   EXPECT_TRUE(identical(decoded.value(), rich_asset()));
+}
+
+// Written when version 1.1 was made; never changes.
+TEST(Bundle, GoldenBundleOfVersion1_1Loads) {
+  std::ifstream file(SQMAP_GOLDEN_DIR "/v1_1.h5", std::ios::binary);
+  const Bytes bytes{std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+  const auto decoded = io::decode(bytes);
+  ASSERT_TRUE(decoded) << decoded.error().finding;
+  EXPECT_TRUE(identical(decoded.value(), bounded_asset()));
 }
 
 // Two rows by four columns, worked by hand from FORMAT.md section 6.1.

@@ -127,6 +127,33 @@ TEST(Hostile, ResealedBitFlipsAreErrorsOrChangeNothing) {
   EXPECT_EQ(H5Fget_obj_count(static_cast<hid_t>(H5F_OBJ_ALL), H5F_OBJ_ALL), 0) << "identifiers left open";
 }
 
+// A Document is what has passed the hashes: its arrays may still say anything.
+TEST(Hostile, BoundsThatDoNotAddUpAreRefused) {
+  const io::Document valid = io::to_document(test::bounded_asset());
+  ASSERT_TRUE(io::to_asset(valid));
+  const auto finding_of = [&](const std::function<void(io::Document&)>& edit) {
+    io::Document document = valid;
+    edit(document);
+    const auto asset = io::to_asset(document);
+    return asset ? "" : asset.error().finding;
+  };
+  const auto cells = [](std::uint32_t value) {
+    return [value](io::Document& document) {
+      std::memcpy(document.tables[io::kBoundCells].data(), &value, sizeof value);
+    };
+  };
+  for (const std::uint32_t value : {4U, 0U, 65535U, 65536U, 0xFFFFFFFFU})
+    EXPECT_NE(finding_of(cells(value)).find("/maps/bounds\""), std::string::npos) << value;
+  for (const io::TableId id : {io::kBoundCells, io::kBoundTolerance, io::kBounds}) {
+    EXPECT_NE(finding_of([&](io::Document& document) { document.tables[id].clear(); }).find("/maps/bound"),
+              std::string::npos);
+    EXPECT_NE(finding_of([&](io::Document& document) {
+                document.tables[id].resize(2 * document.tables[id].size());
+              }).find("/maps/bound"),
+              std::string::npos);
+  }
+}
+
 /// Length and digests as they would be had the file been made like this.
 Bytes resealed(Bytes bytes) {
   const std::uint64_t length = bytes.size();

@@ -16,7 +16,7 @@
 namespace sqmap {
 namespace {
 
-using test::rich_asset;
+using test::bounded_asset;
 
 const double kNan = std::numeric_limits<double>::quiet_NaN();
 const double kInfinity = std::numeric_limits<double>::infinity();
@@ -101,6 +101,15 @@ const std::vector<Breakage>& breakages() {
       {37, "crossing twice", [](Asset& a) { a.parts[1].map.crossings[1].code = 180; }},
       {38, "sample in the last row", [](Asset& a) { a.parts[1].map.vertex_samples[2].cell = 96; }},
       {38, "two samples of a cell", [](Asset& a) { a.parts[1].map.vertex_samples[1].cell = 0; }},
+      {39, "more cells than the format has",
+       [](Asset& a) {
+         a.parts[0].bounds.cells = 65;
+         a.parts[0].bounds.cell.resize(std::size_t{6} * 65 * 65);
+       }},
+      {39, "a bound missing", [](Asset& a) { a.parts[1].bounds.cell.pop_back(); }},
+      {39, "bounds of no cell", [](Asset& a) { a.parts[1].bounds.cells = 0; }},
+      {39, "negative tolerance", [](Asset& a) { a.parts[0].bounds.tolerance_m = -1e-9; }},
+      {39, "tolerance NaN", [](Asset& a) { a.parts[0].bounds.tolerance_m = kNan; }},
       {50, "labels missing", [](Asset& a) { a.face_labels.pop_back(); }},
       {51, "code too large", [](Asset& a) { a.parts[0].map.code[3] = 1024; }},
       {52, "seam bits of no texel", [](Asset& a) { a.parts[1].map.start_inside[13] |= 0b10000; }},
@@ -111,6 +120,8 @@ const std::vector<Breakage>& breakages() {
       {55, "part sphere too small", [](Asset& a) { a.parts[0].sphere.radius_m = 0.6; }},
       {55, "part sphere elsewhere", [](Asset& a) { a.parts[2].sphere.centre_m.x = 0.4; }},
       {56, "asset sphere too small", [](Asset& a) { a.sphere.radius_m = 1; }},
+      {57, "free ranges that overlap", [](Asset& a) { a.parts[0].bounds.cell[3].upper = 204; }},
+      {57, "a side that is none", [](Asset& a) { a.parts[1].bounds.cell[9].sides = 4; }},
   };
   return all;
 }
@@ -122,13 +133,13 @@ std::set<int> rules_of(const std::vector<Finding>& findings) {
 }
 
 TEST(Validate, RichAssetBreaksNoRule) {
-  const auto findings = validate(rich_asset(), CheckLevel::kFull);
+  const auto findings = validate(bounded_asset(), CheckLevel::kFull);
   EXPECT_TRUE(findings.empty()) << findings.front().rule << ": " << findings.front().message;
 }
 
 TEST(Validate, FindsEachBrokenRuleUnderItsNumber) {
   for (const Breakage& breakage : breakages()) {
-    Asset asset = rich_asset();
+    Asset asset = bounded_asset();
     breakage.apply(asset);
     EXPECT_TRUE(rules_of(validate(asset, CheckLevel::kFull)).contains(breakage.rule))
         << breakage.what << " is not found as rule " << breakage.rule;
@@ -151,7 +162,7 @@ TEST(Validate, FormatPageListsExactlyTheseRules) {
 
 TEST(Validate, QuickFindsWhatAReaderMustTrust) {
   for (const Breakage& breakage : breakages()) {
-    Asset asset = rich_asset();
+    Asset asset = bounded_asset();
     breakage.apply(asset);
     EXPECT_EQ(rules_of(validate(asset, CheckLevel::kQuick)).contains(breakage.rule), breakage.rule < 50)
         << breakage.what;
@@ -159,7 +170,7 @@ TEST(Validate, QuickFindsWhatAReaderMustTrust) {
 }
 
 TEST(Validate, NamesThePartAndTheValue) {
-  Asset asset = rich_asset();
+  Asset asset = bounded_asset();
   asset.parts[1].shape.e1 = 7.25;
   const auto findings = validate(asset, CheckLevel::kQuick);
   ASSERT_EQ(findings.size(), 1u);
@@ -168,7 +179,7 @@ TEST(Validate, NamesThePartAndTheValue) {
 }
 
 TEST(Validate, OrdersFindingsByRuleAndPart) {
-  Asset asset = rich_asset();
+  Asset asset = bounded_asset();
   asset.parts[2].shape.e1 = asset.parts[0].shape.e1 = 3;
   asset.parts[1].shape.semi_axes_m.x = -1;
   asset.r_max_m = -1;
@@ -181,7 +192,7 @@ TEST(Validate, OrdersFindingsByRuleAndPart) {
 }
 
 TEST(Validate, IsTotalForAnythingBrokenTogether) {
-  Asset asset = rich_asset();
+  Asset asset = bounded_asset();
   std::set<int> rules;
   for (const Breakage& breakage : breakages()) {
     breakage.apply(asset);
@@ -193,7 +204,7 @@ TEST(Validate, IsTotalForAnythingBrokenTogether) {
 }
 
 TEST(Validate, AcceptsTheLimitsThemselves) {
-  Asset asset = rich_asset();
+  Asset asset = bounded_asset();
   asset.parts[2].shape.e1 = kMinExponent;
   asset.parts[2].shape.e2 = kMaxExponent;
   asset.provenance.generator.assign(4096, 'x');

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // What stands behind a correct content hash: the arrays of a bundle with arbitrary content. The input is a
-// list of edits of the arrays of test::rich_asset(): which array, where, how many bytes, the bytes.
+// list of edits of the arrays of test::bounded_asset(): which array, where, how many bytes, the bytes.
 #include <algorithm>
 #include <cstring>
 #include <utility>
@@ -65,11 +65,11 @@ std::vector<Bytes> sqmap::fuzz::seeds() {
   return {{},
           {9 + 18 + 1, 0x18, 0, 8, 0, 0, 0, 0, 0, 0, 0xF0, 0x3F},
           {9 + 18 + 10, 0, 0, 4, 9, 0, 0, 0},
-          {9 + 18 + 21 + 14, 200, 0, 9 + 18 + 21 + 15, 200, 0, 9 + 18 + 10, 0x30, 0, 4, 200, 0, 0, 0}};
+          {9 + 18 + 24 + 14, 200, 0, 9 + 18 + 24 + 15, 200, 0, 9 + 18 + 10, 0x30, 0, 4, 200, 0, 0, 0}};
 }
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  static const Document kDocument = sqmap::io::to_document(sqmap::test::rich_asset());
+  static const Document kDocument = sqmap::io::to_document(sqmap::test::bounded_asset());
   Document document = kDocument;
   Edits edits(data, size);
   constexpr std::size_t kTexts = sqmap::io::kTextCount, kNumbers = sqmap::io::kNumberCount,

@@ -97,6 +97,25 @@ inline Asset rich_asset() {
   return asset;
 }
 
+/// rich_asset() with bounds of the surface on its first two parts: everything that version 1.1 can hold.
+///
+/// tests/formats/golden/v1_1.h5 is encode() of it.
+inline Asset bounded_asset() {
+  Asset asset = rich_asset();
+  for (const std::uint32_t cells : {3U, 2U}) {
+    SurfaceBounds& bounds = asset.parts[3 - cells].bounds;
+    bounds.cells = cells;
+    bounds.tolerance_m = 0.0001 * cells;
+    for (std::uint32_t k = 0; k < 6 * cells * cells; ++k) {
+      const auto byte = [](std::uint32_t value) { return static_cast<std::uint8_t>(value); };
+      bounds.cell.push_back(
+          {byte(100 + k), byte(150 - k), byte(200 + k), byte(180 - k), byte(20 + k), byte(k % 4)});
+    }
+  }
+  asset.parts[0].bounds.cell[5] = {};  // nothing is known of it
+  return asset;
+}
+
 inline bool same_bits(double a, double b) {
   return std::bit_cast<std::uint64_t>(a) == std::bit_cast<std::uint64_t>(b);
 }

@@ -7,6 +7,7 @@
 
 #include "sqmap/asset/distance_map.hpp"
 #include "sqmap/asset/superquadric.hpp"
+#include "sqmap/asset/surface_bounds.hpp"
 #include "sqmap/asset/vec.hpp"
 
 namespace sqmap {
@@ -31,6 +32,7 @@ struct Part {
   std::uint32_t face_count{};    ///< mesh faces of this part, after repair
   double volume_m3{};            ///< volume of the part, its cuts closed [m^3]
   DistanceMap map;
+  SurfaceBounds bounds;  ///< none unless the bake was asked for them
   friend bool operator==(const Part&, const Part&) = default;
 };
 
