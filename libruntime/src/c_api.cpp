@@ -29,6 +29,7 @@ static_assert(offsetof(SweepResult, contact) == offsetof(sqmap_sweep_result, con
 // Sizes of the structures in version 0.1. They grow at their end only.
 constexpr std::size_t kError01 = 8 + 488 + 256;
 constexpr std::size_t kInfo01 = 64;
+constexpr std::size_t kInfoWithTolerance = 72;
 static_assert(sizeof(sqmap_error) >= kError01 && sizeof(sqmap_object_info) >= kInfo01);
 
 void copy_text(char* to, std::size_t size, const char* from) noexcept {
@@ -242,6 +243,8 @@ sqmap_status sqmap_object_get_info(const sqmap_object* object, sqmap_object_info
   const double values[4] = {ball.centre_m.x, ball.centre_m.y, ball.centre_m.z, ball.radius_m};
   std::copy(values, values + 4, info->sphere_m);
   info->resident_bytes = object->object.resident_bytes() + object->sweeper.resident_bytes();
+  if (info->struct_size >= kInfoWithTolerance)
+    info->certainty_tolerance_m = object->object.certainty_tolerance_m();
   return SQMAP_OK;
 }
 
@@ -286,6 +289,20 @@ sqmap_status sqmap_query(const sqmap_instance* instance, const float* points_m, 
        .layer = optional_array(answers->layer, point_count),
        .inside = optional_array(answers->inside, point_count)},
       query_options(options));
+  return SQMAP_OK;
+}
+
+sqmap_status sqmap_certainty(const sqmap_instance* instance, const float* points_m, std::size_t point_count,
+                             std::uint8_t* certainty) {
+  const sqmap_status status = check(instance, points_m, point_count, nullptr);
+  if (status != SQMAP_OK) return status;
+  if (certainty == nullptr && point_count > 0) return SQMAP_NULL_ARGUMENT;
+  static_assert(sizeof(Certainty) == sizeof *certainty);
+  static_assert(static_cast<int>(Certainty::kUnsure) == SQMAP_UNSURE);
+  static_assert(static_cast<int>(Certainty::kOutside) == SQMAP_SURELY_OUTSIDE);
+  static_assert(static_cast<int>(Certainty::kInside) == SQMAP_SURELY_INSIDE);
+  unpacked(*instance).instance().certainty(vectors(points_m, point_count),
+                                           {reinterpret_cast<Certainty*>(certainty), point_count});
   return SQMAP_OK;
 }
 

@@ -172,4 +172,8 @@ void Instance::query(std::span<const Vec3f> points_m, const Answers& answers,
   }
 }
 
+void Instance::certainty(std::span<const Vec3f> points_m, std::span<Certainty> told) const noexcept {
+  for (std::size_t i = 0; i < points_m.size(); ++i) told[i] = object_->certainty(to_object(points_m[i]));
+}
+
 }  // namespace sqmap::runtime

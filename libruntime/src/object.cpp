@@ -6,6 +6,7 @@
 
 #include "sqmap/asset/validate.hpp"
 
+#include "certainty.hpp"
 #include "chart.hpp"
 #include "combine.hpp"
 #include "engine.hpp"
@@ -15,11 +16,16 @@ namespace sqmap::runtime {
 
 struct Object::Impl {
   explicit Impl(const Asset& asset) : resident(asset), sphere(asset.sphere), r_max_m(asset.r_max_m) {
-    for (const Part& part : asset.parts) level_count = std::max(level_count, part.map.level_count);
+    for (const Part& part : asset.parts) {
+      level_count = std::max(level_count, part.map.level_count);
+      bound_tolerance_m = part.bounds.cells > 0 ? std::max(bound_tolerance_m, part.bounds.tolerance_m)
+                                                : std::numeric_limits<double>::quiet_NaN();
+    }
   }
   Resident resident;
   BoundingSphere sphere;
   double r_max_m;
+  double bound_tolerance_m = 0;
   std::uint32_t level_count = 0;
 };
 
@@ -100,6 +106,14 @@ void Object::query(std::span<const Vec3f> points_m, const Answers& answers,
                    const QueryOptions& options) const noexcept {
   kernels().query(impl_->resident, points_m, answers, options);
 }
+
+void Object::certainty(std::span<const Vec3f> points_m, std::span<Certainty> told) const noexcept {
+  for (std::size_t i = 0; i < points_m.size(); ++i) told[i] = certainty_of(impl_->resident, points_m[i]);
+}
+
+Certainty Object::certainty(const Vec3f& p_m) const noexcept { return certainty_of(impl_->resident, p_m); }
+
+double Object::certainty_tolerance_m() const noexcept { return impl_->bound_tolerance_m; }
 
 void Object::query(const PointBody& body, const BodyPlacement& placement, const Answers& answers,
                    const QueryOptions& options) const noexcept {

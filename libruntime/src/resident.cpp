@@ -22,7 +22,7 @@ class Layout {
   std::uint32_t at() const noexcept { return static_cast<std::uint32_t>(size_); }
   std::size_t size() const noexcept { return size_; }
   void put(const void* data, std::size_t size) {
-    if (out_ != nullptr) std::memcpy(out_ + size_, data, size);
+    if (out_ != nullptr && size > 0) std::memcpy(out_ + size_, data, size);
     size_ += size;
   }
   template <class T>
@@ -88,6 +88,10 @@ float unit_for(double most) { return rounded_up(most / kMostPacked); }
 struct PackedCurve {
   std::uint16_t c_fall[kCells], s_rise[kCells], c_step[kCells + 1], s_step[kCells + 1];
 };
+
+static_assert(2 * sizeof(PackedCurve) == Resident::kCurveBytes);
+static_assert(sizeof(BoundCell) == 6 && std::is_trivially_copyable_v<BoundCell>);
+static_assert(SurfaceBounds::kMostCells <= 255);
 
 /// Differences of `sums`, which ascend from 0, rounded so that their own sums stay within half a unit.
 void pack_differences(const double* sums, double unit, std::uint16_t* out) {
@@ -175,6 +179,9 @@ PartRecord put_part(Layout& out, const Part& part, double units_per_m) {
   const Vec3d& a = part.shape.semi_axes_m;
   record.eta_units = put_curve(out, CurveTable<double>::of(std::sqrt(a.x * a.y), a.z, part.shape.e1));
   record.omega_units = put_curve(out, CurveTable<double>::of(a.x, a.y, part.shape.e2));
+
+  record.bound_cells = static_cast<std::uint8_t>(part.bounds.cells);
+  out.put(part.bounds.cell.data(), part.bounds.cell.size() * sizeof(BoundCell));
 
   record.texels_at = out.at();
   BitPacker packer(out);

@@ -4,13 +4,14 @@
 // object's radius: products of four lengths then neither overflow nor vanish, and changing units rounds
 // nothing. One allocation of
 //
-//     PartRecord[parts] | part 0: curves | texels | sheet blocks | sheets | fan blocks | fans | part 1: ... |
-//     4 bytes
+//     PartRecord[parts] | part 0: curves | bounds | texels | sheet blocks | sheets | fan blocks | fans | part
+//     1: ... | 4 bytes
 //
 //     curves   eta and omega as CurveTable, 16 bits a number: how far c falls and s rises over each cell
 //     (their sums
 //              then err by half a unit, and differences of neighbours, which make the second derivatives,
 //              hardly more), and the steps at the nodes
+//     bounds   BoundCell[6 bound_cells^2], where the asset has bounds
 //     texels   one a node, row-major, `texel_bits` each, least significant bit first: the depth code and,
 //     where
 //              the part has a seam, above it the bit that the node starts inside the mesh
@@ -67,6 +68,7 @@ struct PartRecord {
   std::uint32_t rows{}, cols{}, vertex_count{};
   std::uint16_t miss_code{};
   std::uint8_t level_count{}, code_bits{}, texel_bits{};
+  std::uint8_t bound_cells{};  ///< a side of a face; 0: no bounds
   std::uint32_t curves_at{}, texels_at{};
   SideList sheets, fans;
 
@@ -87,7 +89,8 @@ struct PartRecord {
 
 class Resident {
  public:
-  static constexpr std::uint32_t kBlock = 8;  ///< texels a bit of a side list's blocks
+  static constexpr std::uint32_t kBlock = 8;         ///< texels a bit of a side list's blocks
+  static constexpr std::uint32_t kCurveBytes = 520;  ///< of both curves of a part
 
   /// Precondition: a valid asset. fits() tells whether it could be held; if not, nothing is.
   explicit Resident(const Asset& asset);
@@ -109,6 +112,11 @@ class Resident {
   std::uint32_t texel(const PartRecord& part, std::uint32_t index) const noexcept {
     const std::uint32_t bit = index * part.texel_bits;
     return (load<std::uint32_t>(part.texels_at + bit / 8) >> (bit % 8)) & ((1U << part.texel_bits) - 1U);
+  }
+  /// Precondition: cell < 6 part.bound_cells^2.
+  BoundCell bound(const PartRecord& part, std::uint32_t cell) const noexcept {
+    return load<BoundCell>(part.curves_at + kCurveBytes +
+                           cell * static_cast<std::uint32_t>(sizeof(BoundCell)));
   }
   /// Position of the first entry of a list with key >= `key`, or `count`, without a search where its block is
   /// empty.

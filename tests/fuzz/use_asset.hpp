@@ -35,6 +35,10 @@ inline void use_asset(const Asset& asset) {
         points.push_back(cast<float>(p_m));
       }
   }
+  std::vector<runtime::Certainty> certainty(points.size());
+  object.value().certainty(points, certainty);
+  for (const runtime::Certainty told : certainty)
+    require(told <= runtime::Certainty::kInside, "a certainty is one of the three");
   std::vector<float> distance_m(points.size());
   std::vector<Vec3f> normal(points.size());
   for (const runtime::Layer layer : {runtime::Layer::kOne, runtime::Layer::kTwo, runtime::Layer::kThree}) {

@@ -174,6 +174,24 @@ static void finds_contacts(const sqmap_instance* instance) {
   SQMAP_CHECK(sqmap_all_contacts(instance, points, 5, NULL, NULL, 1, &count) == SQMAP_NULL_ARGUMENT);
 }
 
+// The ball has no bounds: only what lies outside its superquadric is sure.
+static void tells_what_is_sure(const sqmap_object* object, const sqmap_instance* instance) {
+  const float points[9] = {10.2F, 0, 0, 30, 0, 0, NAN, 0, 0};
+  uint8_t certainty[3] = {9, 9, 9};
+  SQMAP_CHECK(sqmap_certainty(instance, points, 3, certainty) == SQMAP_OK);
+  SQMAP_CHECK(certainty[0] == SQMAP_UNSURE && certainty[1] == SQMAP_SURELY_OUTSIDE);
+  SQMAP_CHECK(certainty[2] == SQMAP_UNSURE);
+  SQMAP_CHECK(sqmap_certainty(instance, points, 3, NULL) == SQMAP_NULL_ARGUMENT);
+  SQMAP_CHECK(sqmap_certainty(NULL, points, 3, certainty) == SQMAP_NULL_ARGUMENT);
+  sqmap_object_info info = SQMAP_OBJECT_INFO_INIT;
+  SQMAP_CHECK(sqmap_object_get_info(object, &info) == SQMAP_OK);
+  SQMAP_CHECK(isnan(info.certainty_tolerance_m));
+  // A caller built with version 0.1 has no such field.
+  info.struct_size = 64;
+  info.certainty_tolerance_m = 5;
+  SQMAP_CHECK(sqmap_object_get_info(object, &info) == SQMAP_OK && info.certainty_tolerance_m == 5);
+}
+
 static void sweeps(const sqmap_object* object, const sqmap_instance* instance) {
   const float from[9] = {13, 0, 0, 13, 3, 0, NAN, 0, 0}, to[9] = {7, 0, 0, 7, 3, 0, 0, 0, 0};
   sqmap_sweep_result results[3];
@@ -206,6 +224,7 @@ static void all_about(sqmap_object* object) {
   const sqmap_instance instance = placed(object);
   answers_points(&instance);
   finds_contacts(&instance);
+  tells_what_is_sure(object, &instance);
   sweeps(object, &instance);
   sqmap_object_destroy(object);
 }

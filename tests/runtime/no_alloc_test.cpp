@@ -73,6 +73,7 @@ TEST(NoAllocation, InQueriesContactsAndSweeps) {
   std::vector<std::uint8_t> layer(points.size()), inside(points.size());
   std::vector<Contact> contacts(points.size());
   std::vector<SweepResult> results(motions.size());
+  std::vector<Certainty> certainty(points.size());
   std::size_t found = 0, swept = 0;
   {
     const test::NoAllocation guard;
@@ -81,6 +82,7 @@ TEST(NoAllocation, InQueriesContactsAndSweeps) {
       const Instance copy = start;
       copy.query(points, {distance, normal, surface, part, layer, inside}, options);
       for (const Vec3f& p : points) found += copy.query(p, options).inside;
+      copy.certainty(points, certainty);
       found += any_contact(copy, points, options);
       found += first_contact(copy, points, options)->point;
       found += deepest_contact(copy, points, options)->point;

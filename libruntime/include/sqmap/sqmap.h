@@ -119,9 +119,11 @@ typedef struct sqmap_object_info {
   double r_max_m;
   double sphere_m[4];
   uint64_t resident_bytes;  // memory that queries and sweeps hold
+  // The farthest that a point told to be surely on one side may lie on the other; NaN: a part has no bounds.
+  double certainty_tolerance_m;
 } sqmap_object_info;
 #define SQMAP_OBJECT_INFO_INIT \
-  { sizeof(sqmap_object_info), 0, 0, 0, 0, {0, 0, 0, 0}, 0 }
+  { sizeof(sqmap_object_info), 0, 0, 0, 0, {0, 0, 0, 0}, 0, 0 }
 
 SQMAP_API sqmap_status sqmap_object_get_info(const sqmap_object* object, sqmap_object_info* info);
 
@@ -172,6 +174,12 @@ typedef struct sqmap_answers {
 // options: NULL for the defaults.
 SQMAP_API sqmap_status sqmap_query(const sqmap_instance* instance, const float* points_m, size_t point_count,
                                    const sqmap_query_options* options, const sqmap_answers* answers);
+
+// What the bounds of a conservative bake prove of a point. Unsure: the surface may be near, so look closer;
+// within a part without bounds, every point.
+enum { SQMAP_UNSURE = 0, SQMAP_SURELY_OUTSIDE = 1, SQMAP_SURELY_INSIDE = 2 };
+SQMAP_API sqmap_status sqmap_certainty(const sqmap_instance* instance, const float* points_m,
+                                       size_t point_count, uint8_t* certainty);
 
 // Contacts
 

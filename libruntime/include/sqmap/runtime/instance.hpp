@@ -58,6 +58,9 @@ class Instance {
   void query(std::span<const Vec3f> points_m, const Answers& answers,
              const QueryOptions& options = {}) const noexcept;
 
+  /// As Object::certainty, world frame. It is told of the points as to_object() gives them.
+  void certainty(std::span<const Vec3f> points_m, std::span<Certainty> told) const noexcept;
+
   const Object& object() const noexcept { return *object_; }
   float scale() const noexcept { return scale_; }
   bool mirrored() const noexcept;

@@ -53,6 +53,13 @@ struct Answer {
   bool inside = false;
 };
 
+/// What is proven of a point. Stable numbers.
+enum class Certainty : std::uint8_t {
+  kUnsure = 0,   ///< look closer: the surface may be near. Who must not miss the inside takes it for kInside
+  kOutside = 1,  ///< surely outside the mesh
+  kInside = 2,   ///< surely inside the mesh
+};
+
 /// Where the results of a batch go. A span is either empty (not wanted) or as long as the points.
 struct Answers {
   std::span<float> signed_distance_m{};
@@ -101,6 +108,14 @@ class Object {
   void query(std::span<const Vec3f> points_m, const Answers& answers,
              const QueryOptions& options = {}) const noexcept;
 
+  /// What the bounds of a conservative bake prove of points, object frame [m]. Same answers one at a time.
+  /// Precondition: `told` is as long as the points. Bounded time, no allocation.
+  void certainty(std::span<const Vec3f> points_m, std::span<Certainty> told) const noexcept;
+  Certainty certainty(const Vec3f& p_m) const noexcept;
+  /// The farthest that a point told kOutside may lie inside the mesh, or one told kInside outside of it [m].
+  /// NaN where a part has no bounds: what is told of points within it is then kUnsure.
+  double certainty_tolerance_m() const noexcept;
+
   /// The points of a body in this object's frame, answers by the body's indices: as query(span) of the moved
   /// points, but blocks that touch no part cost next to nothing. A placement that is not finite finds
   /// nothing.
@@ -127,9 +142,10 @@ class Object {
   ///
   ///     constant + sum over parts of  record + 520 + ceil(n (b + s) / 8) + [c > 0] (ceil(n / 64) + 6 c)
   ///                                                                      + [v > 0] (ceil(n / 64) + 8 v)
+  ///                                   + 36 m^2
   ///
-  /// s = 1 where any texel starts inside the mesh, else 0. The constant is below 200 bytes and the record
-  /// below 256, both fixed by the build.
+  /// m cells a side of the part's bounds, 0 without; s = 1 where any texel starts inside the mesh, else 0.
+  /// The constant is below 200 bytes and the record below 256, both fixed by the build.
   std::size_t resident_bytes() const noexcept;
 
  private:
