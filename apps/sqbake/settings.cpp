@@ -28,6 +28,7 @@ constexpr std::array<std::pair<std::string_view, bake::Quality>, 3> kQualityName
     {{"draft", bake::Quality::kDraft},
      {"standard", bake::Quality::kStandard},
      {"fine", bake::Quality::kFine}}};
+constexpr std::array<std::pair<std::string_view, bool>, 2> kSwitchNames{{{"off", false}, {"on", true}}};
 constexpr std::array<std::pair<std::string_view, Fallback>, 2> kFallbackNames{
     {{"none", Fallback::kNone}, {"superquadric", Fallback::kSuperquadric}}};
 
@@ -99,6 +100,10 @@ Outcome apply_max_bytes(AssetOptions& options, std::string_view text) {
   return Done{};
 }
 
+Outcome apply_conservative(AssetOptions& options, std::string_view text) {
+  return choose<bool>(text, kSwitchNames, options.bake.conservative);
+}
+
 Outcome apply_timeout(AssetOptions& options, std::string_view text) {
   const Result<double> seconds = parse_duration(text);
   if (!seconds) return seconds.error();
@@ -140,11 +145,12 @@ std::string default_quality() { return "standard"; }
 std::string default_max_error() { return max_error_text(kDefaults.bake); }
 std::string default_max_parts() { return max_parts_text(kDefaults.bake); }
 std::string default_max_bytes() { return max_bytes_text(kDefaults.bake); }
+std::string default_conservative() { return name_of<bool>(kDefaults.bake.conservative, kSwitchNames); }
 std::string default_timeout() { return fmt::format("{}s", kDefaults.timeout_s); }
 std::string default_memory() { return "none"; }
 std::string default_fallback() { return name_of<Fallback>(kDefaults.fallback, kFallbackNames); }
 
-constexpr std::array<Setting, 10> kSettings{{
+constexpr std::array<Setting, 11> kSettings{{
     {"unit", "UNIT", "Unit of the coordinates: m, cm, mm, um, in, ft or a number of metres", default_unit,
      apply_unit},
     {"up", "AXIS", "Axis of the input that points up: x, y, z; turned to z", default_up, apply_up},
@@ -162,6 +168,9 @@ constexpr std::array<Setting, 10> kSettings{{
     {"max-parts", "COUNT", "Use at most this many parts", default_max_parts, apply_max_parts},
     {"max-bytes", "BYTES", "Encoded size of the maps, about; K, M and G are powers of 1024",
      default_max_bytes, apply_max_bytes},
+    {"conservative", "on|off",
+     "Also store bounds of the surface, which tell what is surely inside or outside;\nneeds a closed mesh",
+     default_conservative, apply_conservative},
     {"timeout", "TIME", "End the bake of a mesh after this time: 90s, 5m, 2h or none", default_timeout,
      apply_timeout},
     {"memory", "BYTES", "Memory (heap) that the bake of a mesh may take, e.g. 2G, or none", default_memory,

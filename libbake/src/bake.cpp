@@ -23,6 +23,7 @@
 #include "refine.hpp"
 #include "repair_steps.hpp"
 #include "segment_limit.hpp"
+#include "surface_bounds.hpp"
 
 namespace sqmap::bake {
 
@@ -258,6 +259,14 @@ Result<BakeResult> bake(const SourceMesh& source, const BakeOptions& asked, cons
   const OpenPlaces open(prepared.mesh);
   const MeshQueries queries{prepared.mesh, rays, oracle, open};
   const double r_max_m = largest_vertex_distance(prepared.mesh);
+  if (asked.conservative && !open.none()) {
+    const MeshRecord& found = prepared.record;
+    return Error{Status::kInvalidMesh,
+                 "the surface is open or folded over (" + std::to_string(found.boundary_edges) +
+                     " open edges, " + std::to_string(found.non_manifold_edges) +
+                     " non-manifold): a conservative bake needs a closed one",
+                 "close it, let --repair all do it, or bake without --conservative"};
+  }
   BakeOptions options = asked;  // the target as a share of R_max, which is known only now
   if (asked.max_error_m > 0) options.max_error_percent = std::min(100.0, 100 * asked.max_error_m / r_max_m);
   if (progress.stop()) return cancelled();
@@ -295,6 +304,15 @@ Result<BakeResult> bake(const SourceMesh& source, const BakeOptions& asked, cons
   asset.mesh = prepared.record;
   asset.provenance = provenance(source, asked);
   if (progress.stop()) return cancelled();
+
+  if (options.conservative) {
+    stages.begin("bounds");
+    tbb::parallel_for(std::size_t{0}, asset.parts.size(), [&](std::size_t k) {
+      Part& part = asset.parts[k];
+      part.bounds = bound_surface(part, asset.sphere, queries, bound_cells(part, r_max_m));
+    });
+    if (progress.stop()) return cancelled();
+  }
 
   stages.begin("measure");
   auto object = runtime::Object::build(asset);

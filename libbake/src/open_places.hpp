@@ -12,6 +12,9 @@ class OpenPlaces {
  public:
   explicit OpenPlaces(const Mesh& mesh);
 
+  /// The mesh is closed everywhere.
+  bool none() const { return balls_.empty() && !everywhere_; }
+
   /// False: the crossings of the line through p tell its winding number, as those of a closed mesh would. A
   /// surface across a hole can lie in the hole's ball, so a line that misses the balls misses such surfaces;
   /// and far enough from the balls all of them together would not change the rounded winding number.

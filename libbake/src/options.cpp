@@ -55,13 +55,13 @@ std::string BakeOptions::to_json() const {
   static constexpr const char* kRepairNames[] = {"none", "safe", "all"};
   static constexpr const char* kAxisNames[] = {"x", "y", "z"};
   const auto& [read_options, repair_options, decompose_options, fit_options, error_percent, error_m, parts,
-               bytes, samples, sample_seed] = *this;
+               bytes, samples, sample_seed, with_bounds] = *this;
   const auto& [metres_per_unit, up, size_limit] = read_options;  // the limit decides no byte
   const auto& [policy, weld_tolerance, max_hole_edges] = repair_options;
   const auto& [source_count, window, locale_width, boundary_strength, min_hull_gain, k_h, t_h,
                use_boundary_strength, use_hyperbolic, join_components, min_part_area] = decompose_options;
   const auto& [min_exponent, max_exponent, max_iterations, min_axis_ratio, quick] = fit_options;
-  const nlohmann::json json = {
+  nlohmann::json json = {
       {"max_error_percent", error_percent},
       {"max_error_m", error_m},
       {"max_parts", parts},
@@ -92,6 +92,7 @@ std::string BakeOptions::to_json() const {
         {"min_axis_ratio", min_axis_ratio},
         {"quick", quick}}},
   };
+  if (with_bounds) json["conservative"] = true;  // named where it decides bytes
   return json.dump();
 }
 

@@ -33,6 +33,7 @@ struct BakeOptions {
       std::uint64_t{128} * 1024;       ///< of the stored maps, about; resolution gives way first
   std::uint32_t sample_count = 20000;  ///< points of each error measurement
   std::uint64_t seed = 1;              ///< of the sample points
+  bool conservative = false;           ///< also store bounds of the surface, on top of max_bytes
 
   Outcome check() const;
   std::string to_json() const;
