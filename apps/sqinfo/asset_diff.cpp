@@ -43,6 +43,11 @@ class Comparison {
   }
   void orientation(const Quaternion& a, const Quaternion& b);
   void map(const DistanceMap& a, const DistanceMap& b);
+  void bounds(const SurfaceBounds& a, const SurfaceBounds& b) {
+    exact("bound cells", a.cells, b.cells);
+    length("bound tolerance_m", a.tolerance_m, b.tolerance_m);
+    list("bounds", a.cell, b.cell);
+  }
   void add(const char* what, std::string first, std::string second, double size) {
     found_.push_back(
         {prefix_.empty() ? what : prefix_ + " " + what, std::move(first), std::move(second), size});
@@ -134,6 +139,7 @@ void compare_parts(Comparison& compare, const Part& a, const Part& b) {
   compare.exact("face count", a.face_count, b.face_count);
   compare.volume("volume_m3", a.volume_m3, b.volume_m3);
   compare.map(a.map, b.map);
+  compare.bounds(a.bounds, b.bounds);
 }
 
 void compare_mesh(Comparison& compare, const MeshRecord& a, const MeshRecord& b) {

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <cmath>
 #include <cstdint>
 #include <filesystem>
 #include <map>
@@ -27,7 +28,20 @@ constexpr std::uint64_t kMaxPointBytes = std::uint64_t{4} << 30;
 struct QueryArguments {
   std::filesystem::path bundle, points;
   runtime::QueryOptions options;
+  bool with_certainty = false;
 };
+
+const char* certainty_name(runtime::Certainty certainty) {
+  switch (certainty) {
+    case runtime::Certainty::kOutside:
+      return "outside";
+    case runtime::Certainty::kInside:
+      return "inside";
+    case runtime::Certainty::kUnsure:
+      break;
+  }
+  return "unsure";
+}
 
 std::string csv_line(const Vec3f& p, const runtime::Answer& answer) {
   std::string distance, normal = ",,", part;
@@ -39,8 +53,8 @@ std::string csv_line(const Vec3f& p, const runtime::Answer& answer) {
   if (norm(answer.normal) > 0)
     normal = fmt::format("{},{},{}", answer.normal.x, answer.normal.y, answer.normal.z);
   if (answer.part != runtime::kNowhere) part = fmt::format("{}", answer.part);
-  return fmt::format("{},{},{},{},{},{},{},{}\n", p.x, p.y, p.z, answer.inside ? 1 : 0, distance, normal,
-                     part, static_cast<int>(answer.layer));
+  return fmt::format("{},{},{},{},{},{},{},{}", p.x, p.y, p.z, answer.inside ? 1 : 0, distance, normal, part,
+                     static_cast<int>(answer.layer));
 }
 
 Exit run_query(Console& console, const QueryArguments& arguments) {
@@ -48,6 +62,11 @@ Exit run_query(Console& console, const QueryArguments& arguments) {
   if (!asset) return report(console, arguments.bundle, asset.error());
   const Result<runtime::Object> object = runtime::Object::build(asset.value());
   if (!object) return report(console, arguments.bundle, object.error());
+
+  if (arguments.with_certainty && std::isnan(object.value().certainty_tolerance_m()))
+    return report(console, arguments.bundle,
+                  {Status::kInvalidAsset, "has no bounds of the surface, which --certainty asks for",
+                   "bake with --conservative on"});
 
   const bool is_stdin = arguments.points == "-";
   const std::filesystem::path name = is_stdin ? "standard input" : arguments.points;
@@ -59,9 +78,12 @@ Exit run_query(Console& console, const QueryArguments& arguments) {
   if (!points) return report(console, name, points.error());
 
   constexpr std::size_t kFlushBytes = 1 << 16;
-  std::string text = "x,y,z,inside,signed_distance,nx,ny,nz,part,layer\n";
+  std::string text = "x,y,z,inside,signed_distance,nx,ny,nz,part,layer";
+  text += arguments.with_certainty ? ",certainty\n" : "\n";
   for (const Vec3f& p : points.value()) {
     text += csv_line(p, object.value().query(p, arguments.options));
+    if (arguments.with_certainty) text += fmt::format(",{}", certainty_name(object.value().certainty(p)));
+    text += '\n';
     if (text.size() >= kFlushBytes) {
       console.out(text);
       text.clear();
@@ -103,6 +125,9 @@ std::function<Exit(Console&)> declare_query(CLI::App& app) {
   app.add_option("--level", args->options.level, "Level of the maps, 0 the finest (default 0)")
       ->check(CLI::Range(0, 31).description(""))
       ->type_name("LEVEL");
+  app.add_flag("--certainty", args->with_certainty,
+               "Also a column `certainty`: outside and inside are proven, unsure is not (the bundle must be\n"
+               "baked with --conservative on)");
   return [args](Console& console) { return run_query(console, *args); };
 }
 

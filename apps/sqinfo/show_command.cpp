@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <set>
 #include <string>
 #include <vector>
@@ -17,6 +18,7 @@
 
 #include "../common/files.hpp"
 #include "../common/json_text.hpp"
+#include "certainty_share.hpp"
 #include "commands.hpp"
 #include "map_statistics.hpp"
 
@@ -33,6 +35,7 @@ struct BundleFacts {
   std::uint64_t file_bytes{};
   std::size_t resident_bytes{};
   std::size_t segment_count{};
+  std::optional<CertaintyShare> certainty;  ///< where every part has bounds
 };
 
 Result<BundleFacts> gather(const std::filesystem::path& path) {
@@ -51,6 +54,7 @@ Result<BundleFacts> gather(const std::filesystem::path& path) {
   facts.datasets = std::move(datasets).value();
   facts.file_bytes = bytes.value().size();
   facts.resident_bytes = object.value().resident_bytes();
+  facts.certainty = certainty_share(facts.asset, object.value());
   std::set<std::uint32_t> segments;
   for (const Part& part : facts.asset.parts) segments.insert(part.segment);
   facts.segment_count = segments.size();
@@ -119,6 +123,11 @@ std::string json_report(const BundleFacts& facts) {
               {"options", options_json(origin.options_json)}}},
             {"mesh", apps::to_json(asset.mesh)},
             {"face_label_count", asset.face_labels.size()}};
+  if (facts.certainty)
+    json["bounds"] = {{"bytes", facts.certainty->bytes},
+                      {"tolerance_m", facts.certainty->tolerance_m},
+                      {"surely_outside_percent", facts.certainty->outside_percent},
+                      {"surely_inside_percent", facts.certainty->inside_percent}};
   json["parts"] = Json::array();
   for (const Part& part : asset.parts) json["parts"].push_back(part_json(part));
   json["errors"] = apps::to_json(asset.errors);
@@ -194,6 +203,12 @@ std::string text_report(const BundleFacts& facts) {
       mesh.is_closed ? "closed" : "open", mesh.volume_m3, mesh.welded_vertices, mesh.degenerate_faces,
       mesh.duplicate_faces, mesh.flipped_faces, mesh.filled_holes, mesh.boundary_edges,
       mesh.non_manifold_edges, origin.generator, origin.generator_version, origin.options_json);
+  if (facts.certainty)
+    text += fmt::format(
+        "  bounds     {} bytes in memory; of the superquadrics' volume {:.1f} % is surely outside, {:.1f} % "
+        "surely inside, within {:.2g} m\n",
+        facts.certainty->bytes, facts.certainty->outside_percent, facts.certainty->inside_percent,
+        facts.certainty->tolerance_m);
   text += parts_table(asset) + errors_table(asset.errors);
   text += fmt::format("\nstored: bytes in the file, and as declared\n");
   std::uint64_t stored = 0, decoded = 0;

@@ -29,6 +29,46 @@ class Bundle(FolderTest):
         return [dict(zip(header.split(","), line.split(","))) for line in lines]
 
 
+class Certainty(Bundle):
+    def test_is_told_of_a_conservative_bundle(self):
+        self.bundle = self.bake(sphere(4, RADIUS_M), "sure", "--conservative", "on")
+        text = "\n".join(f"{x},0,0" for x in (0.5, 0.98 * RADIUS_M, RADIUS_M, 3 * RADIUS_M, -1))
+        result = run("sqinfo", "query", self.bundle, "--points", "-", "--certainty", input=text)
+        self.assert_exit(result, 0)
+        header, *lines = result.stdout.splitlines()
+        self.assertEqual(header, "x,y,z,inside,signed_distance,nx,ny,nz,part,layer,certainty")
+        self.assertEqual([line.split(",")[-1] for line in lines],
+                         ["inside", "inside", "unsure", "outside", "inside"])
+        shown = json.loads(run("sqinfo", "show", self.bundle, "--format", "json").stdout)
+        self.assertGreater(shown["bounds"]["surely_inside_percent"], 85)
+        self.assertLess(shown["bounds"]["tolerance_m"], 1e-5 * RADIUS_M)
+        self.assertIn("surely inside", run("sqinfo", "show", self.bundle).stdout)
+        self.assert_exit(run("sqinfo", "validate", self.bundle, "--level", "full"), 0)
+        # Bounds are all that the option adds.
+        plain = self.bake(sphere(4, RADIUS_M), "plain")
+        self.assertNotIn("bounds", json.loads(run("sqinfo", "show", plain, "--format", "json").stdout))
+        self.assertEqual(run("sqinfo", "query", plain, "--points", "-", input=text).stdout,
+                         run("sqinfo", "query", self.bundle, "--points", "-", input=text).stdout)
+        differ = run("sqinfo", "diff", self.bundle, plain)
+        self.assert_exit(differ, 7)
+        self.assertIn("bound", differ.stdout)
+        self.assertNotIn("map", differ.stdout)
+
+    def test_needs_bounds(self):
+        result = run("sqinfo", "query", self.bundle, "--points", "-", "--certainty", input="0,0,0")
+        self.assert_exit(result, 4)
+        self.assertIn("--conservative on", result.stderr)
+        self.assertEqual(result.stdout, "")
+
+    def test_needs_a_closed_mesh(self):
+        vertices, faces = sphere(2)
+        mesh = write_off(self.folder / "open.off", (vertices, faces[1:]))
+        result = run("sqbake", "bake", mesh, "-o", self.folder / "open.h5", "--conservative", "on",
+                     "--repair", "safe")
+        self.assert_exit(result, 4)
+        self.assertIn("3 open edges", result.stderr)
+
+
 class Show(Bundle):
     def test_tells_the_sphere_from_its_bundle(self):
         shown = json.loads(run("sqinfo", "show", self.bundle, "--format", "json").stdout)

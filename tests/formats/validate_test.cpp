@@ -196,7 +196,7 @@ TEST(Validate, IsTotalForAnythingBrokenTogether) {
   std::set<int> rules;
   for (const Breakage& breakage : breakages()) {
     breakage.apply(asset);
-    if (asset.parts.size() != 3) asset.parts = rich_asset().parts;
+    if (asset.parts.size() != 3) asset.parts = bounded_asset().parts;
     for (const Finding& finding : validate(asset, CheckLevel::kFull)) rules.insert(finding.rule);
   }
   EXPECT_GT(rules.size(), 20u);
