@@ -33,6 +33,7 @@ PRIVATE_HEADERS = [
     ("libruntime/src/*", ["libruntime/src/*", "tests/runtime/*"]),
     ("libbake/src/*", ["libbake/src/*", "tests/bake/*"]),
     ("apps/common/*", ["apps/*", "tests/apps/*"]),
+    ("apps/sqbake/report/*", ["apps/sqbake/*", "apps/sqbench/drawings.cpp", "tests/apps/*"]),
     ("apps/sqbake/*", ["apps/sqbake/*", "tests/apps/*"]),
     ("apps/sqinfo/*", ["apps/sqinfo/*", "tests/apps/*"]),
     ("apps/sqsim/*", ["apps/sqsim/*", "tests/apps/*", "tests/fuzz/*"]),
@@ -40,20 +41,22 @@ PRIVATE_HEADERS = [
     ("tests/*", ["tests/*"]),
 ]
 
+VERSIONS = "apps/sqbench/machine.cpp"  # says with which versions of the peers it was built
+
 # Third-party libraries: how an include of theirs begins, and the only files that may hold one.
 THIRD_PARTY = {
     "Boost.Multiprecision": (("boost/multiprecision/",), ["tests/hard/reference.hpp"]),
     "CGAL": (("CGAL/", "boost/"), ["libbake/src/heat_method.cpp", "libbake/src/hull.cpp", "libbake/src/oracle.cpp",
-                                   "apps/sqbench/peer_cgal.cpp"]),
+                                   "apps/sqbench/peer_cgal.cpp", VERSIONS]),
     "Ceres": (("ceres/", "glog/"), ["libbake/src/fit_surface.cpp"]),
     "Eigen": (("Eigen/", "unsupported/"), ["libbake/src/fit.cpp", "libbake/src/fit_model.cpp",
                                            "libbake/src/fit_model.hpp", "libbake/src/fit_starts.cpp",
                                            "libbake/src/fit_volume.cpp", "libbake/src/heat_method.cpp",
                                            "libbake/src/partition.cpp"]),
     "assimp": (("assimp/",), ["libbake/src/scene_reader.cpp", "apps/common/source_mesh.cpp"]),
-    "Embree": (("embree",), ["libbake/src/ray_tracer.cpp", "apps/sqbench/embree_closest.cpp"]),
-    "Highway": (("hwy/",), ["apps/sqbench/grid_kernels.cpp", "libruntime/src/engine.cpp"]),
-    "FCL": (("fcl/",), ["apps/sqbench/peer_fcl.cpp"]),
+    "Embree": (("embree",), ["libbake/src/ray_tracer.cpp", "apps/sqbench/embree_closest.cpp", VERSIONS]),
+    "Highway": (("hwy/",), ["apps/sqbench/grid_kernels.cpp", "libruntime/src/engine.cpp", VERSIONS]),
+    "FCL": (("fcl/",), ["apps/sqbench/peer_fcl.cpp", VERSIONS]),
     "TBB": (("tbb/", "oneapi/"), ["libbake/src/*.cpp", "apps/sqbake/worker_pool.cpp",
                                   "tests/bake/decompose_test.cpp", "tests/bake/fit_stress.cpp",
                                   "tests/support/certainty_points.hpp"]),
@@ -65,7 +68,7 @@ THIRD_PARTY = {
     "JSON": (("nlohmann/",), ["apps/*.cpp", "apps/common/json_text.hpp", "libbake/src/options.cpp"]),
     "toml++": (("toml++/",), ["apps/sqbake/toml_files.cpp"]),
     "CLI11, fmt": (("CLI/", "fmt/"), ["apps/*.cpp"]),
-    "Bullet": (("Bullet", "LinearMath/", "btBullet"), ["apps/sqsim/cloth.cpp", "apps/sqbench/peer_gimpact.cpp"]),
+    "Bullet": (("Bullet", "LinearMath/", "btBullet"), ["apps/sqsim/cloth.cpp", "apps/sqbench/peer_gimpact.cpp", VERSIONS]),
     "libpng": (("png.h",), ["apps/common/png_bytes.cpp"]),
     "RapidCheck": (("rapidcheck/",), ["tests/runtime/property_test.cpp", "tests/hard/property_test.cpp"]),
     "GoogleTest": (("gtest/", "gmock/"), ["tests/*_test.cpp"]),
