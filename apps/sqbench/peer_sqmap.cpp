@@ -36,7 +36,7 @@ double way_out_m(const Superquadric& shape, const Vec3d& m, const Vec3d& directi
 /// To the nearest point of a superquadric: the best of a lattice of angles, then ever smaller steps from
 /// there.
 double least_distance_m(const Superquadric& shape, const Vec3d& m) {
-  constexpr double pi = std::numbers::pi;
+  constexpr double kPi = std::numbers::pi;
   constexpr int kRows = 64;
   const auto at = [](double angle, double e) {
     return superellipse_point(std::cos(angle), std::sin(angle), e);
@@ -48,20 +48,21 @@ double least_distance_m(const Superquadric& shape, const Vec3d& m) {
     best_m = found_m, best_eta = eta, best_omega = omega;
     return true;
   };
-  std::array<SuperellipsePoint<double>, 2 * kRows> columns;
+  std::array<SuperellipsePoint<double>, std::size_t{2} * kRows> columns;
   for (int c = 0; c < 2 * kRows; ++c)
-    columns[static_cast<std::size_t>(c)] = at(pi * c / kRows - pi, shape.e2);
+    columns[static_cast<std::size_t>(c)] = at(kPi * c / kRows - kPi, shape.e2);
   for (int r = 0; r <= kRows; ++r) {
-    const double eta = pi * r / kRows - pi / 2;
+    const double eta = kPi * r / kRows - kPi / 2;
     const auto on_eta = at(eta, shape.e1);
     for (int c = 0; c < 2 * kRows; ++c)
-      consider(eta, pi * c / kRows - pi, on_eta, columns[static_cast<std::size_t>(c)]);
+      consider(eta, kPi * c / kRows - kPi, on_eta, columns[static_cast<std::size_t>(c)]);
   }
-  for (double step = pi / kRows; step > 1e-6;) {
+  for (double step = kPi / kRows; step > 1e-6;) {
     const double eta = best_eta, omega = best_omega;
     bool is_better = false;
     for (int k = 0; k < 9; ++k) {
-      const double near_eta = eta + (k / 3 - 1) * step, near_omega = omega + (k % 3 - 1) * step;
+      const int rows_up = k / 3 - 1, columns_right = k % 3 - 1;
+      const double near_eta = eta + rows_up * step, near_omega = omega + columns_right * step;
       is_better |= consider(near_eta, near_omega, at(near_eta, shape.e1), at(near_omega, shape.e2));
     }
     if (!is_better) step /= 2;
