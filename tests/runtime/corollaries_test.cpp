@@ -2,7 +2,6 @@
 //
 // Corollaries 1 and 2 of the paper's section 5: where the error of the represented surface goes when the maps
 // get denser. It is measured at points of the true surface, whose distance is zero.
-#include <array>
 #include <cmath>
 #include <random>
 #include <utility>
@@ -67,31 +66,24 @@ double error_m(const std::vector<Ball>& balls, const std::vector<Chart>& charts,
   return sum_m / static_cast<double>(points_m.size());
 }
 
-constexpr std::array<std::uint32_t, 4> kRows{17, 33, 65, 129};
-
-TEST(Corollaries, ErrorOfAConvexShapeFallsWithTheSquareOfTheTexel) {
-  const std::vector<Ball> ball{{{0.1, -0.05, 0.15}, 0.7}};
-  const std::vector<Chart> chart{{{{1, 1.1, 1.2}, 1, 1}, {}}};
-  double before_m = error_m(ball, chart, kRows[0], true);
-  for (std::size_t k = 1; k < kRows.size(); ++k) {
-    const double after_m = error_m(ball, chart, kRows[k], true);
-    EXPECT_LT(after_m, before_m / 3.5) << kRows[k] << " rows";
+/// Each halving of the texel divides the error by more than `factor`, down to less than `last_m`.
+void expect_falling(const std::vector<Ball>& balls, const Chart& chart, double factor, double last_m) {
+  double before_m = error_m(balls, {chart}, 17, true);
+  for (const std::uint32_t rows : {33U, 65U, 129U}) {
+    const double after_m = error_m(balls, {chart}, rows, true);
+    EXPECT_LT(after_m, before_m / factor) << rows << " rows";
     before_m = after_m;
   }
-  EXPECT_LT(before_m, 1e-4);
+  EXPECT_LT(before_m, last_m);
+}
+
+TEST(Corollaries, ErrorOfAConvexShapeFallsWithTheSquareOfTheTexel) {
+  expect_falling({{{0.1, -0.05, 0.15}, 0.7}}, {{{1, 1.1, 1.2}, 1, 1}, {}}, 3.5, 1e-4);
 }
 
 TEST(Corollaries, ErrorOfAQ1ConcavityFallsAtLeastWithTheTexel) {
   // The crease of two balls is seen from everywhere; cells that straddle it are only first order.
-  const std::vector<Ball> balls{{{0, 0, 0.35}, 0.5}, {{0, 0, -0.35}, 0.5}};
-  const std::vector<Chart> chart{{{{0.7, 0.7, 1.0}, 1, 1}, {}}};
-  double before_m = error_m(balls, chart, kRows[0], true);
-  for (std::size_t k = 1; k < kRows.size(); ++k) {
-    const double after_m = error_m(balls, chart, kRows[k], true);
-    EXPECT_LT(after_m, before_m / 2) << kRows[k] << " rows";
-    before_m = after_m;
-  }
-  EXPECT_LT(before_m, 3e-4);
+  expect_falling({{{0, 0, 0.35}, 0.5}, {{0, 0, -0.35}, 0.5}}, {{{0.7, 0.7, 1.0}, 1, 1}, {}}, 2, 3e-4);
 }
 
 TEST(Corollaries, ErrorOfAQ2ConcavityHasAFloorThatFurtherCrossingsOrASplitRemove) {
