@@ -31,23 +31,23 @@ T value_of(Result<T> result) {
 
 /// Two unit spheres, their centres 1.3 apart, as one closed surface of revolution.
 bake::Mesh two_spheres() {
-  constexpr double pi = std::numbers::pi, kApart = 1.3;
+  constexpr double kPi = std::numbers::pi, kApart = 1.3;
   constexpr int kAround = 96, kHalf = 40;
   const double seam = std::acos(kApart / 2);  // where the two meet, from the line of centres
   bake::Mesh mesh;
   const auto add_ring = [&](double z, double radius) {
     for (int k = 0; k < kAround; ++k) {
-      const double angle = 2 * pi * k / kAround;
+      const double angle = 2 * kPi * k / kAround;
       mesh.vertices_m.push_back({radius * std::cos(angle), radius * std::sin(angle), z});
     }
   };
   mesh.vertices_m.push_back({0, 0, -1 - kApart / 2});
   for (int i = 1; i <= kHalf; ++i) {  // the lower sphere up to the seam, in equal angles
-    const double angle = (pi - seam) * i / kHalf;
+    const double angle = (kPi - seam) * i / kHalf;
     add_ring(-kApart / 2 - std::cos(angle), std::sin(angle));
   }
   for (int i = kHalf - 1; i >= 1; --i) {
-    const double angle = (pi - seam) * i / kHalf;
+    const double angle = (kPi - seam) * i / kHalf;
     add_ring(kApart / 2 + std::cos(angle), std::sin(angle));
   }
   mesh.vertices_m.push_back({0, 0, 1 + kApart / 2});
@@ -82,10 +82,10 @@ std::vector<std::uint8_t> map_picture(const Model& model, double& longest_m) {
   const auto turn = rotation(part.object_from_part.orientation);
   std::vector<double> depth_m;
   std::vector<bake::RayTracer::Hit> hits;
-  constexpr double pi = std::numbers::pi;
+  constexpr double kPi = std::numbers::pi;
   for (int r = kRows - 1; r >= 0; --r)
     for (int c = 0; c < kCols; ++c) {
-      const double eta = pi * (r + 0.5) / kRows - pi / 2, omega = 2 * pi * c / kCols - pi;
+      const double eta = kPi * (r + 0.5) / kRows - kPi / 2, omega = 2 * kPi * c / kCols - kPi;
       const auto on_eta = superellipse_point(std::cos(eta), std::sin(eta), part.shape.e1);
       const auto on_omega = superellipse_point(std::cos(omega), std::sin(omega), part.shape.e2);
       const Vec3d from_m =

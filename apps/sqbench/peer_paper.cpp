@@ -90,18 +90,17 @@ class PaperPart {
         std::max(0, static_cast<int>(
                         std::max(std::log2(rows / 16.0), std::log2(cols / 32.0))));  // (18), its integer part
 
-    constexpr double pi = std::numbers::pi;
     std::vector<SuperellipsePoint<double>> eta, omega;
     eta_.reserve(static_cast<std::size_t>(rows_));
     omega_.reserve(static_cast<std::size_t>(cols_));
     depth_m_.reserve(eta_.capacity() * omega_.capacity());
     for (std::int32_t r = 0; r < rows_; ++r) {
-      const double angle = pi * r / (rows_ - 1) - pi / 2;
+      const double angle = std::numbers::pi * r / (rows_ - 1) - std::numbers::pi / 2;
       eta.push_back(superellipse_point(std::max(std::cos(angle), 0.0), std::sin(angle), shape.e1));
       eta_.push_back(in_float(eta.back()));
     }
     for (std::int32_t c = 0; c < cols_; ++c) {
-      const double angle = 2 * pi * c / cols_ - pi;
+      const double angle = 2 * std::numbers::pi * c / cols_ - std::numbers::pi;
       omega.push_back(superellipse_point(std::cos(angle), std::sin(angle), shape.e2));
       omega_.push_back(in_float(omega.back()));
     }

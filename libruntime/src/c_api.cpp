@@ -16,7 +16,8 @@ namespace {
 
 // Arrays of C are read and written in place: the layouts must be the same.
 static_assert(sizeof(Vec3f) == 3 * sizeof(float));
-static_assert(sizeof(Contact) == sizeof(sqmap_contact) && alignof(Contact) == alignof(sqmap_contact));
+static_assert(sizeof(Contact) == sizeof(sqmap_contact));
+static_assert(alignof(Contact) == alignof(sqmap_contact));  // NOLINT(misc-redundant-expression): two types
 static_assert(offsetof(Contact, depth_m) == offsetof(sqmap_contact, depth_m));
 static_assert(offsetof(Contact, normal) == offsetof(sqmap_contact, normal));
 static_assert(offsetof(Contact, position_m) == offsetof(sqmap_contact, position_m));

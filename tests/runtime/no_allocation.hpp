@@ -32,6 +32,7 @@ inline void* allocate(std::size_t size) {
 
 }  // namespace sqmap::test
 
+// NOLINTBEGIN(misc-definitions-in-headers): one source includes them
 // Not inlined: GCC would see free() called for what it knows to come from operator new, and warn.
 [[gnu::noinline]] void* operator new(std::size_t size) { return sqmap::test::allocate(size); }
 [[gnu::noinline]] void* operator new[](std::size_t size) { return sqmap::test::allocate(size); }
@@ -46,3 +47,4 @@ inline void* allocate(std::size_t size) {
 [[gnu::noinline]] void* operator new[](std::size_t size, const std::nothrow_t&) noexcept {
   return sqmap::test::allocate(size);
 }
+// NOLINTEND(misc-definitions-in-headers)
