@@ -337,10 +337,13 @@ class Smoke(SmokeRun):
 
     def test_compare_finds_a_slower_frame_and_only_that(self):
         before, after = self.folder / "a.json", self.folder / "b.json"
-        slower = json.loads(self.files["results.json"])
+        steady = json.loads(self.files["results.json"])
+        us = steady["frames"][0]["us"]  # as measured, its spread may be wider than what is added below
+        us["lower"] = us["upper"] = us["median"]
+        before.write_text(json.dumps(steady), encoding="utf-8")
+        slower = json.loads(json.dumps(steady))
         for key in ("median", "lower", "upper"):
             slower["frames"][0]["us"][key] *= 10
-        before.write_text(self.files["results.json"], encoding="utf-8")
         after.write_text(json.dumps(slower), encoding="utf-8")
 
         def compare(*files):
@@ -352,7 +355,7 @@ class Smoke(SmokeRun):
         self.assertIn("10.000", worse.stdout)
         self.assertEqual(better.stdout.count(" faster"), 1)
         self.assertEqual(compare(before, COMPARE).returncode, 4)
-        slower = json.loads(self.files["results.json"])
+        slower = json.loads(json.dumps(steady))
         slower["budgets"][0]["mean_error_percent"] *= 2
         after.write_text(json.dumps(slower), encoding="utf-8")
         less_accurate = compare(before, after)
