@@ -6,6 +6,7 @@
 #include <limits>
 #include <random>
 #include <thread>
+#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -61,6 +62,29 @@ TEST(Object, FindsTheNearestSurfaceOfDeepPointsToo) {
       const Answer answer = object.query(cast<float>(p), {Layer::kThree});
       EXPECT_NEAR(answer.signed_distance_m, -depth_m, 0.01) << depth_m << " m below " << i;
     }
+  }
+}
+
+TEST(Object, InnerPointsOverNoPatchKnowWhereTheirRayLeaves) {
+  // A superquadric half within a ball: rays from its inner half bound no patch, but cross the ball's far
+  // side.
+  const std::vector<test::Ball> balls{{{}, 0.5}};
+  const Vec3d centre_m{0.3, 0, 0};
+  const Part part = test::traced_part({{0.3, 0.3, 0.3}, 1, 1}, centre_m, 65, 128, 1, 1,
+                                      [&](const Vec3d& origin_m, const Vec3d& direction, bool& inside) {
+                                        return test::union_crossings_m(balls, origin_m, direction, inside);
+                                      });
+  const Object object = built(test::asset_of({part}, 1));
+  std::mt19937_64 rng(3);
+  for (int i = 0; i < 500; ++i) {
+    Vec3d direction = random_direction(rng);
+    direction.x = -2 - std::abs(direction.x);  // away from the part of the superquadric beyond the ball
+    const Vec3d p_m = centre_m + 0.02 * normalized(direction);
+    const Answer answer = object.query(cast<float>(p_m), {Layer::kTwo});
+    EXPECT_TRUE(answer.inside);
+    EXPECT_NEAR(answer.signed_distance_m, norm(p_m) - 0.5, 0.02) << i;
+    EXPECT_NEAR(norm(cast<double>(answer.surface_m)), 0.5, 1e-3) << i;
+    EXPECT_GT(dot(cast<double>(answer.normal), normalized(cast<double>(answer.surface_m))), 0.9) << i;
   }
 }
 
