@@ -10,11 +10,13 @@ from pathlib import Path
 HERE = Path(__file__).resolve().parent
 SCRIPT = HERE.parent.parent / "scripts/bake_corpus"
 NOTHING_TO_DO = 77
+IS_SANITIZED = bool(os.environ.get("SQMAP_SANITIZED"))
+TIME_LIMIT_S = 1700 if IS_SANITIZED else 240
 
 
 def bake_corpus(*arguments):
     return subprocess.run([SCRIPT, *map(str, arguments), "--offline", "--files", HERE / "replay.txt"],
-                          stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False)
+                          stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=TIME_LIMIT_S, check=False)
 
 
 class Replay(unittest.TestCase):
@@ -23,7 +25,7 @@ class Replay(unittest.TestCase):
         holder = tempfile.TemporaryDirectory(prefix="sqmap-")
         cls.addClassCleanup(holder.cleanup)
         cls.out = Path(holder.name)
-        limits = ["--memory", "none"] if os.environ.get("SQMAP_SANITIZED") else []  # sanitizers reserve terabytes
+        limits = ["--memory", "none"] if IS_SANITIZED else []  # sanitizers reserve terabytes
         cls.result = bake_corpus(cls.out, "--bin", os.environ["SQMAP_BIN_DIR"], "--contain", 3, *limits)
         if cls.result.returncode == NOTHING_TO_DO:
             raise unittest.SkipTest(cls.result.stderr.strip())
