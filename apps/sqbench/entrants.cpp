@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include "peer.hpp"
+#include "peer_nanovdb.hpp"
 
 namespace sqmap::bench {
 namespace {
@@ -47,6 +48,12 @@ Entrant adf_entrant(unsigned resolution, double bound_percent) {
           [=](const Model& model) { return make_adf(model, resolution, bound_percent); }, resolution};
 }
 
+Entrant nanovdb_entrant(NanovdbCode code, unsigned resolution) {
+  const char* kind = code == NanovdbCode::kFloat ? "float" : "8bit";
+  return {fmt::format("nanovdb-{}-{}", kind, resolution), fmt::format("nanovdb-{}", kind),
+          [=](const Model& model) { return make_nanovdb(model, code, resolution); }, resolution};
+}
+
 const Entrant kEmbree{"embree-closest", "embree-closest", make_embree, 0};
 const Entrant kCgal{"cgal-closest", "cgal-closest", make_cgal, 0};
 
@@ -60,6 +67,8 @@ std::vector<Entrant> frame_entrants(bool smoke) {
   entrants.push_back(grid_entrant(GridCode::kFloatSimd, 128));
   entrants.push_back(grid_entrant(GridCode::kFloatScalar, 128));
   for (const unsigned resolution : {64U, 128U}) entrants.push_back(bricks_entrant(resolution));
+  entrants.push_back(nanovdb_entrant(NanovdbCode::kFloat, 128));
+  entrants.push_back(nanovdb_entrant(NanovdbCode::k8Bit, 128));
   entrants.push_back(adf_entrant(128, 0.1));
   if (!smoke) entrants.push_back(adf_entrant(256, 0.05));
   entrants.push_back(paper_entrant(100, 200, 0));
@@ -81,6 +90,9 @@ std::vector<Entrant> accuracy_entrants(const Model& model, bool smoke) {
     entrants.push_back(grid_entrant(GridCode::kFloatSimd, resolution));
     entrants.push_back(grid_entrant(GridCode::kInt16Simd, resolution));
     entrants.push_back(bricks_entrant(resolution));
+    if (resolution < 64) continue;  // the levels above its leaves make a coarse tree larger than a dense grid
+    entrants.push_back(nanovdb_entrant(NanovdbCode::kFloat, resolution));
+    entrants.push_back(nanovdb_entrant(NanovdbCode::k8Bit, resolution));
   }
   entrants.push_back(grid_entrant(GridCode::kInt16SimdCulled, 128));
   entrants.push_back(grid_entrant(GridCode::kFloatScalar, 128));
