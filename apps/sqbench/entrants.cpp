@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include "peer.hpp"
+#include "peer_hulls.hpp"
 #include "peer_nanovdb.hpp"
 
 namespace sqmap::bench {
@@ -54,6 +55,11 @@ Entrant nanovdb_entrant(NanovdbCode code, unsigned resolution) {
           [=](const Model& model) { return make_nanovdb(model, code, resolution); }, resolution};
 }
 
+Entrant hulls_entrant(unsigned hulls) {
+  return {fmt::format("bullet-hacd-{}", hulls), "bullet-hacd",
+          [=](const Model& model) { return make_hulls(model, hulls); }, 0};
+}
+
 const Entrant kEmbree{"embree-closest", "embree-closest", make_embree, 0};
 const Entrant kCgal{"cgal-closest", "cgal-closest", make_cgal, 0};
 
@@ -71,6 +77,7 @@ std::vector<Entrant> frame_entrants(bool smoke) {
   entrants.push_back(nanovdb_entrant(NanovdbCode::k8Bit, 128));
   entrants.push_back(adf_entrant(128, 0.1));
   if (!smoke) entrants.push_back(adf_entrant(256, 0.05));
+  entrants.push_back(hulls_entrant(16));
   entrants.push_back(paper_entrant(100, 200, 0));
   if (!smoke) entrants.push_back(paper_entrant(100, 200, 1));
   entrants.push_back(kEmbree);
@@ -105,6 +112,7 @@ std::vector<Entrant> accuracy_entrants(const Model& model, bool smoke) {
     if (!smoke || rows == 50 || rows == 100) entrants.push_back(paper_entrant(rows, 2 * rows, 0));
   for (const unsigned rows : {25U, 50U, 100U})
     if (!smoke || rows == 25) entrants.push_back(paper_entrant(rows, 2 * rows, 1));
+  entrants.push_back(hulls_entrant(16));
   entrants.push_back(kEmbree);
   entrants.push_back(kCgal);
   return entrants;

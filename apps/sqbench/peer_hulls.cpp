@@ -1,0 +1,183 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+//
+// What games link today: Bullet's hierarchical approximate convex decomposition (HACD), one hull a cluster. A
+// point is asked of the hulls whose boxes, grown by the band, hold it; the deepest answer counts. Inside a
+// hull that is its most outward plane; outside, Bullet's GJK.
+#include "peer_hulls.hpp"
+
+#include <algorithm>
+#include <limits>
+#include <vector>
+
+#include <BulletCollision/CollisionShapes/btConvexHullShape.h>
+#include <BulletCollision/CollisionShapes/btConvexPolyhedron.h>
+#include <BulletCollision/NarrowPhaseCollision/btGjkEpa2.h>
+#include <HACD/hacdHACD.h>
+
+#include "exact_answer.hpp"
+
+namespace sqmap::bench {
+namespace {
+
+struct Hull {
+  std::unique_ptr<btConvexHullShape> shape;
+  Vec3f low_m, high_m;  // box, grown by the band
+  bool may_hold(const Vec3f& p) const noexcept {
+    return p.x >= low_m.x && p.x <= high_m.x && p.y >= low_m.y && p.y <= high_m.y && p.z >= low_m.z &&
+           p.z <= high_m.z;
+  }
+};
+
+/// Of a point above the face's plane [m].
+float height_m(const btFace& face, const btVector3& p_m) {
+  return p_m.x() * face.m_plane[0] + p_m.y() * face.m_plane[1] + p_m.z() * face.m_plane[2] + face.m_plane[3];
+}
+
+btVector3 bullet(const Vec3f& p) { return {p.x, p.y, p.z}; }
+
+/// Corners of the hulls, a vector each.
+std::vector<std::vector<Vec3d>> decomposed(const bake::Mesh& mesh, std::size_t least_hulls) {
+  std::vector<HACD::Vec3<HACD::Real>> points;
+  std::vector<HACD::Vec3<long>> faces;
+  for (const Vec3d& v : mesh.vertices_m) points.emplace_back(v.x, v.y, v.z);
+  for (const auto& [a, b, c] : mesh.faces) faces.emplace_back(long{a}, long{b}, long{c});
+  HACD::HACD hacd;
+  hacd.SetPoints(points.data());
+  hacd.SetNPoints(points.size());
+  hacd.SetTriangles(faces.data());
+  hacd.SetNTriangles(faces.size());
+  hacd.SetCompacityWeight(0.1);
+  hacd.SetVolumeWeight(0);
+  hacd.SetNClusters(least_hulls);
+  hacd.SetNVerticesPerCH(100);
+  hacd.SetConcavity(100);  // of a mesh 1,000 long: the number of clusters decides
+  hacd.SetAddExtraDistPoints(false);
+  hacd.SetAddNeighboursDistPoints(false);
+  hacd.SetAddFacesPoints(false);
+  hacd.NormalizeData();  // shifts and scales the points; the hulls stay so
+  hacd.Compute();
+  std::size_t one = 0, other = 0;  // the ends of the longest stretch of x
+  for (std::size_t k = 0; k < points.size(); ++k) {
+    if (mesh.vertices_m[k].x < mesh.vertices_m[one].x) one = k;
+    if (mesh.vertices_m[k].x > mesh.vertices_m[other].x) other = k;
+  }
+  const auto placed = [&](std::size_t k) { return Vec3d{points[k].X(), points[k].Y(), points[k].Z()}; };
+  const double unit_m =
+      (mesh.vertices_m[other].x - mesh.vertices_m[one].x) / (placed(other).x - placed(one).x);
+  std::vector<std::vector<Vec3d>> hulls;
+  for (std::size_t k = 0; k < hacd.GetNClusters(); ++k) {
+    std::vector<HACD::Vec3<HACD::Real>> corners(hacd.GetNPointsCH(k));
+    std::vector<HACD::Vec3<long>> triangles(hacd.GetNTrianglesCH(k));
+    hacd.GetCH(k, corners.data(), triangles.data());
+    hulls.emplace_back();
+    for (const auto& p : corners)
+      hulls.back().push_back(mesh.vertices_m[one] + unit_m * (Vec3d{p.X(), p.Y(), p.Z()} - placed(one)));
+  }
+  return hulls;
+}
+
+/// No ball in the hull is larger: half the least width between a face and the corner farthest from it.
+float most_depth_m(const btConvexPolyhedron& solid) {
+  float least_m = std::numeric_limits<float>::infinity();
+  for (int k = 0; k < solid.m_faces.size(); ++k) {
+    float width_m = 0;
+    for (int v = 0; v < solid.m_vertices.size(); ++v)
+      width_m = std::max(width_m, -height_m(solid.m_faces[k], solid.m_vertices[v]));
+    least_m = std::min(least_m, width_m);
+  }
+  return least_m / 2;
+}
+
+class HullsPeer : public Peer {
+ public:
+  HullsPeer(const Model& model, std::size_t least_hulls)
+      : near_(model), band_m_(static_cast<float>(kBand * model.r_max_m())) {
+    float deepest_m = band_m_;
+    for (const std::vector<Vec3d>& corners : decomposed(model.mesh, least_hulls)) {
+      Hull hull{std::make_unique<btConvexHullShape>(), cast<float>(corners.front()),
+                cast<float>(corners.front())};
+      for (const Vec3d& corner : corners) {
+        const Vec3f p = cast<float>(corner);
+        hull.shape->addPoint(bullet(p), false);
+        for (int axis = 0; axis < 3; ++axis) {
+          hull.low_m[axis] = std::min(hull.low_m[axis], p[axis] - band_m_);
+          hull.high_m[axis] = std::max(hull.high_m[axis], p[axis] + band_m_);
+        }
+      }
+      hull.shape->setMargin(0);
+      hull.shape->recalcLocalAabb();
+      if (!hull.shape->initializePolyhedralFeatures()) continue;  // flat: nothing can be inside
+      deepest_m = std::max(deepest_m, most_depth_m(*hull.shape->getConvexPolyhedron()));
+      hulls_.push_back(std::move(hull));
+    }
+    // Of a point within the band they tell at most the band outside, and inside no more than fits a hull.
+    stated_percent_ = 100 * (band_m_ + deepest_m) / model.r_max_m();
+  }
+
+  void answer(const Cloud& cloud, const Placement& placement, Hits& hits) const override {
+    hits.count = 0;
+    for (std::size_t i = 0; i < cloud.count; ++i) {
+      const Vec3f p_m = placement.apply(cloud.points_m[i]);
+      if (!near_.holds(p_m)) continue;
+      float deepest_m = band_m_;
+      btVector3 normal(0, 0, 0);
+      for (const Hull& hull : hulls_)
+        if (hull.may_hold(p_m)) ask(*hull.shape, bullet(p_m), deepest_m, normal);
+      if (deepest_m < band_m_) hits.add(i, deepest_m, {normal.x(), normal.y(), normal.z()});
+    }
+  }
+  std::size_t bytes() const override {
+    std::size_t sum = sizeof(*this);
+    for (const Hull& hull : hulls_) {
+      const btConvexPolyhedron& solid = *hull.shape->getConvexPolyhedron();
+      sum += sizeof(Hull) + sizeof(btConvexHullShape) + sizeof(btConvexPolyhedron);
+      sum += static_cast<std::size_t>(hull.shape->getNumPoints() + solid.m_vertices.size() +
+                                      solid.m_uniqueEdges.size()) *
+             sizeof(btVector3);
+      for (int k = 0; k < solid.m_faces.size(); ++k)
+        sum += sizeof(btFace) + static_cast<std::size_t>(solid.m_faces[k].m_indices.size()) * sizeof(int);
+    }
+    return sum;
+  }
+  StatedError stated_error() const override { return {stated_percent_, false}; }
+
+ private:
+  /// Lowers `deepest_m` to the signed distance to the hull if that is less.
+  static void ask(const btConvexHullShape& hull, const btVector3& p_m, float& deepest_m, btVector3& normal) {
+    const btConvexPolyhedron& solid = *hull.getConvexPolyhedron();
+    float most_m = -std::numeric_limits<float>::infinity();
+    int outward = 0;
+    for (int k = 0; k < solid.m_faces.size(); ++k) {
+      const float here_m = height_m(solid.m_faces[k], p_m);
+      if (here_m <= most_m) continue;
+      most_m = here_m;
+      outward = k;
+      if (most_m >= deepest_m) return;  // the distance is no less
+    }
+    if (most_m <= 0) {
+      deepest_m = most_m;
+      const btScalar* plane = solid.m_faces[outward].m_plane;
+      normal.setValue(plane[0], plane[1], plane[2]);
+      return;
+    }
+    btGjkEpaSolver2::sResults results;
+    const float distance_m =
+        btGjkEpaSolver2::SignedDistance(p_m, 0, &hull, btTransform::getIdentity(), results);
+    if (distance_m >= deepest_m) return;
+    deepest_m = distance_m;
+    normal = results.normal;
+  }
+
+  std::vector<Hull> hulls_;
+  NearBox near_;
+  float band_m_;
+  double stated_percent_{};
+};
+
+}  // namespace
+
+std::unique_ptr<Peer> make_hulls(const Model& model, std::size_t least_hulls) {
+  return std::make_unique<HullsPeer>(model, least_hulls);
+}
+
+}  // namespace sqmap::bench
