@@ -5,6 +5,7 @@
 #include <array>
 #include <limits>
 #include <span>
+#include <unordered_map>
 
 #include <Eigen/Eigenvalues>
 #include <tbb/parallel_for.h>
@@ -117,33 +118,47 @@ double volume_after_next_cut_m3(const SolidSet& set, const Solid& side) {
   return least;
 }
 
+/// Gives triangles of caps that have none (kNewFace) the label of the triangle across their base, so that a
+/// cap stays with what it closes and widens no other segment.
+void label_caps(const Solid& solid, std::vector<std::uint32_t>& label) {
+  const auto key = [](std::uint32_t from, std::uint32_t to) { return std::uint64_t{from} << 32 | to; };
+  std::unordered_map<std::uint64_t, std::vector<std::size_t>> caps;  // by the edge that a neighbour has
+  for (std::size_t k = 0; k < label.size(); ++k)
+    if (label[k] == kNewFace) caps[key(solid.triangles[k][1], solid.triangles[k][0])].push_back(k);
+  if (caps.empty()) return;
+  for (std::size_t k = 0; k < label.size() && !caps.empty(); ++k) {
+    if (label[k] == kNewFace) continue;
+    const auto& t = solid.triangles[k];
+    for (std::size_t side = 0; side < 3; ++side) {
+      const auto found = caps.find(key(t[side], t[(side + 1) % 3]));
+      if (found == caps.end()) continue;
+      for (const std::size_t cap : found->second) label[cap] = label[k];
+      caps.erase(found);
+    }
+  }
+}
+
 }  // namespace
 
 std::vector<Cell> close_segments(SolidSet& set, const Solid& whole, const Decomposition& segments) {
   std::vector<Cell> cells;
   Solid rest = whole;
+  std::vector<std::uint32_t> label(rest.triangles.size(), kNewFace);  // segment of each triangle of the rest
+  for (std::size_t k = 0; k < label.size(); ++k)
+    if (rest.face[k] != kNewFace) label[k] = segments.label[rest.face[k]];
+  label_caps(rest, label);
   const auto count = static_cast<std::uint32_t>(segments.reasons.size());
   for (std::uint32_t segment = 0; segment < count; ++segment) {
     Cell cell;
     cell.segment = segment;
     cell.reason = segments.reasons[segment];
     if (segment + 1 < count) {
-      // Caps of earlier cuts go to whichever side holds most of their base's neighbours; any side is valid,
-      // the nearer one keeps hulls small.
-      std::vector<std::uint32_t> vertex_segment(set.vertices_m.size(), kNewFace);
-      for (std::size_t k = 0; k < rest.triangles.size(); ++k) {
-        if (rest.face[k] == kNewFace) continue;
-        for (const std::uint32_t id : rest.triangles[k]) {
-          vertex_segment[id] = std::min(vertex_segment[id], segments.label[rest.face[k]]);
-        }
-      }
-      auto [first, second] = set.split(rest, [&](std::size_t k) {
-        if (rest.face[k] != kNewFace) return segments.label[rest.face[k]] == segment;
-        return vertex_segment[rest.triangles[k][0]] == segment &&
-               vertex_segment[rest.triangles[k][1]] == segment;
-      });
+      auto [first, second] = set.split(rest, [&](std::size_t k) { return label[k] == segment; });
       cell.solid = std::move(first);
       rest = std::move(second);
+      std::erase(label, segment);
+      label.resize(rest.triangles.size(), kNewFace);
+      label_caps(rest, label);
     } else {
       cell.solid = rest;
     }
