@@ -32,11 +32,11 @@ struct Refinement {
   std::string stopped_by;  ///< "target", "parts" or "gain": no split lowers the error further
 };
 
-/// Splits the parts that add most to the signed-distance error near the surface, again and again, until the
-/// mean error is within the target, the parts are spent, or no split pays. A split that does not lower the
-/// error is undone: it would cost bytes, and its seam is one more place where rays see little. Where nothing
-/// else is left, splits that do not pay are kept on trial, for what their halves may gain; the best partition
-/// on the way is the result. Errors: kCancelled, kBakeFailed.
+/// Splits the parts that add most to the signed-distance error near the surface, and that enclose most beside
+/// the mesh, again and again, until the mean error is within the target, the parts are spent, or no split
+/// pays. A split that does not lower the error is undone: it would cost bytes, and its seam is one more place
+/// where rays see little. Where nothing else is left, splits that do not pay are kept on trial, for what
+/// their halves may gain; the best partition on the way is the result. Errors: kCancelled, kBakeFailed.
 Result<Refinement> refine(SolidSet& set, std::vector<Cell> cells, const MeshQueries& queries, double r_max_m,
                           const BakeOptions& options, const Progress& progress);
 
