@@ -27,7 +27,7 @@ constexpr const char* kStyle =
     "body{font:15px/1.45 system-ui,sans-serif;max-width:70em;margin:2em auto;padding:0 1em}"
     "table{border-collapse:collapse;margin:1em 0;font-size:13px;font-variant-numeric:tabular-nums}"
     "td,th{padding:3px 9px;border-bottom:1px solid #8886;text-align:right;vertical-align:top}"
-    "td.t,th.t{text-align:left;overflow-wrap:anywhere}"
+    "td.t,th.t{text-align:left;overflow-wrap:anywhere;min-width:7em}"
     "th button{all:unset;cursor:pointer}th button:focus-visible{outline:2px solid}"
     ".bar{display:flex;width:16em;height:1.1em}.bar i{display:block;min-width:1px}"
     ".gallery{display:flex;flex-wrap:wrap;gap:1em}figure{margin:0;width:300px;font-size:13px}"
@@ -243,12 +243,13 @@ std::string gallery(std::span<const AssetRecord> records, std::size_t most) {
     const Result<std::vector<std::uint8_t>> png = part_picture(asset.value(), kPictureSide);
     if (!png) continue;
     ++drawn;
+    const std::size_t parts = asset.value().parts.size();
     figures += fmt::format(
         "<figure><img width=\"{}\" height=\"{}\" alt=\"{} superquadrics of {}, and the surface their maps "
         "hold\" "
-        "src=\"data:image/png;base64,{}\"><figcaption>{}: {} parts, depth error {} %</figcaption></figure>\n",
-        2 * kPictureSide, kPictureSide, asset.value().parts.size(), html_text(record->input),
-        base64(png.value()), html_text(record->input), asset.value().parts.size(),
+        "src=\"data:image/png;base64,{}\"><figcaption>{}: {}, depth error {} %</figcaption></figure>\n",
+        2 * kPictureSide, kPictureSide, parts, html_text(record->input), base64(png.value()),
+        html_text(record->input), parts == 1 ? "1 part" : fmt::format("{} parts", parts),
         figure(depth_error(*record)));
   }
   if (drawn == 0) return "";
