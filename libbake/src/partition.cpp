@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <limits>
 #include <span>
 #include <unordered_map>
@@ -22,28 +23,43 @@ constexpr std::size_t kHullPoints = 400;
 constexpr std::array<double, 7> kQuantiles{0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8};
 constexpr std::array<double, 3> kNextQuantiles{0.3, 0.5, 0.7};
 
-Vec3d centroid(const SolidSet& set, const std::array<std::uint32_t, 3>& t) {
-  return (1.0 / 3) * (set.vertices_m[t[0]] + set.vertices_m[t[1]] + set.vertices_m[t[2]]);
+/// Where the half-spaces overlap.
+using Region = std::vector<HalfSpace>;
+
+bool holds(const Region& region, const Vec3d& p_m) {
+  return std::all_of(region.begin(), region.end(), [&](const HalfSpace& h) { return h.above_m(p_m) < 0; });
 }
 
-/// Principal axes of the triangles' centroids, weighted by area.
-std::array<Vec3d, 3> principal_axes(const SolidSet& set, const Solid& solid) {
+HalfSpace other_side(const HalfSpace& h) { return {-h.normal, -h.height_m}; }
+
+Region with(Region region, const HalfSpace& h) {
+  region.push_back(h);
+  return region;
+}
+
+/// Principal axes of the centroids of triangles in the region, weighted by area.
+std::array<Vec3d, 3> principal_axes(const SolidSet& set, const Solid& solid, const Region& region) {
+  struct Mass {
+    Vec3d at_m;
+    double area;  // twice
+  };
+  std::vector<Mass> masses;
   Vec3d mean;
   double weight = 0;
-  std::vector<double> area;
-  area.reserve(solid.triangles.size());
   for (const auto& t : solid.triangles) {
+    const Vec3d at_m = set.centroid(t);
+    if (!holds(region, at_m)) continue;
     const Vec3d &a = set.vertices_m[t[0]], &b = set.vertices_m[t[1]], &c = set.vertices_m[t[2]];
-    area.push_back(norm(cross(b - a, c - a)));
-    mean = mean + area.back() * centroid(set, t);
-    weight += area.back();
+    masses.push_back({at_m, norm(cross(b - a, c - a))});
+    mean = mean + masses.back().area * at_m;
+    weight += masses.back().area;
   }
   mean = (1 / weight) * mean;
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
-  for (std::size_t k = 0; k < solid.triangles.size(); ++k) {
-    const Vec3d d = centroid(set, solid.triangles[k]) - mean;
+  for (const Mass& mass : masses) {
+    const Vec3d d = mass.at_m - mean;
     const Eigen::Vector3d v(d.x, d.y, d.z);
-    covariance += area[k] / weight * v * v.transpose();
+    covariance += mass.area / weight * v * v.transpose();
   }
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(covariance);
   std::array<Vec3d, 3> axes;
@@ -54,67 +70,85 @@ std::array<Vec3d, 3> principal_axes(const SolidSet& set, const Solid& solid) {
   return axes;
 }
 
-double hull_volume_m3(const SolidSet& set, const Solid& solid) {
+/// What of the polygon lies in the half-space.
+std::vector<Vec3d> clipped(const std::vector<Vec3d>& polygon_m, const HalfSpace& h) {
+  std::vector<Vec3d> inside;
+  for (std::size_t k = 0; k < polygon_m.size(); ++k) {
+    const Vec3d &a = polygon_m[k], &b = polygon_m[(k + 1) % polygon_m.size()];
+    const double from_m = h.above_m(a), to_m = h.above_m(b);
+    if (from_m < 0) inside.push_back(a);
+    if ((from_m < 0) != (to_m < 0)) inside.push_back(a + from_m / (from_m - to_m) * (b - a));
+  }
+  return inside;
+}
+
+/// Of what SolidSet::split would leave of the solid in the region.
+double hull_volume_m3(const SolidSet& set, const Solid& solid, const Region& region) {
   std::vector<std::uint32_t> ids;
-  for (const auto& t : solid.triangles) ids.insert(ids.end(), t.begin(), t.end());
+  std::vector<Vec3d> cut_m;
+  for (std::size_t k = 0; k < solid.triangles.size(); ++k) {
+    const auto& t = solid.triangles[k];
+    if (solid.face[k] != kNewFace) {
+      if (holds(region, set.centroid(t))) ids.insert(ids.end(), t.begin(), t.end());
+      continue;
+    }
+    std::vector<Vec3d> polygon_m{set.vertices_m[t[0]], set.vertices_m[t[1]], set.vertices_m[t[2]]};
+    for (const HalfSpace& h : region) polygon_m = clipped(polygon_m, h);
+    cut_m.insert(cut_m.end(), polygon_m.begin(), polygon_m.end());
+  }
   std::sort(ids.begin(), ids.end());
   ids.erase(std::unique(ids.begin(), ids.end()), ids.end());
-  const std::size_t stride = std::max<std::size_t>(1, ids.size() / kHullPoints);
-  std::vector<Vec3d> points;
-  for (std::size_t k = 0; k < ids.size(); k += stride) points.push_back(set.vertices_m[ids[k]]);
-  return convex_hull(points).volume_m3;
+  for (const std::uint32_t id : ids) cut_m.push_back(set.vertices_m[id]);
+  const std::size_t stride = std::max<std::size_t>(1, cut_m.size() / kHullPoints);
+  std::vector<Vec3d> points_m;
+  for (std::size_t k = 0; k < cut_m.size(); k += stride) points_m.push_back(cut_m[k]);
+  return convex_hull(points_m).volume_m3;
 }
 
 struct Cut {
-  std::vector<bool> first_side;                                ///< empty: the plane does not cut
-  double volume_m3 = std::numeric_limits<double>::infinity();  ///< of the hulls of both sides
+  HalfSpace plane;
+  double volume_m3 =
+      std::numeric_limits<double>::infinity();  ///< of the hulls of both sides; infinite: cuts nothing
 };
 
-/// The triangles on one side of a cut, its caps left open: enough for a hull.
-Solid side_of(const Solid& solid, const Cut& cut, bool first) {
-  Solid side;
+/// Cuts of the solid's share of the region at each quantile along each principal axis, axis by axis.
+std::vector<Cut> plane_cuts(const SolidSet& set, const Solid& solid, const Region& region,
+                            std::span<const double> quantiles) {
+  std::vector<Vec3d> mesh_centroids_m;
+  std::vector<Vec3d> centroids_m;
   for (std::size_t k = 0; k < solid.triangles.size(); ++k) {
-    if (cut.first_side[k] != first) continue;
-    side.triangles.push_back(solid.triangles[k]);
-    side.face.push_back(solid.face[k]);
+    const Vec3d at_m = set.centroid(solid.triangles[k]);
+    if (!holds(region, at_m)) continue;
+    centroids_m.push_back(at_m);
+    if (solid.face[k] != kNewFace) mesh_centroids_m.push_back(at_m);
   }
-  return side;
-}
-
-/// Cuts at each quantile along each principal axis, axis by axis.
-std::vector<Cut> plane_cuts(const SolidSet& set, const Solid& solid, std::span<const double> quantiles) {
-  std::size_t mesh_triangles = 0;
-  for (const std::uint32_t face : solid.face) mesh_triangles += face != kNewFace;
-  if (mesh_triangles < 2) return {};
-  const std::array<Vec3d, 3> axes = principal_axes(set, solid);
+  if (mesh_centroids_m.size() < 2) return {};
+  const std::array<Vec3d, 3> axes = principal_axes(set, solid, region);
   std::vector<Cut> cuts(axes.size() * quantiles.size());
   tbb::parallel_for(std::size_t{0}, cuts.size(), [&](std::size_t c) {
     const Vec3d& axis = axes[c / quantiles.size()];
-    std::vector<double> height(solid.triangles.size());
-    for (std::size_t k = 0; k < height.size(); ++k) height[k] = dot(axis, centroid(set, solid.triangles[k]));
-    const auto [low, high] = std::minmax_element(height.begin(), height.end());
-    const double at = *low + quantiles[c % quantiles.size()] * (*high - *low);
-    Cut cut;
-    cut.first_side.resize(height.size());
-    std::size_t below = 0;
-    for (std::size_t k = 0; k < height.size(); ++k) {
-      cut.first_side[k] = height[k] < at;
-      below += cut.first_side[k] && solid.face[k] != kNewFace;
+    double low = std::numeric_limits<double>::infinity(), high = -low;
+    for (const Vec3d& at_m : centroids_m) {
+      low = std::min(low, dot(axis, at_m));
+      high = std::max(high, dot(axis, at_m));
     }
-    if (below == 0 || below == mesh_triangles) return;
-    cut.volume_m3 =
-        hull_volume_m3(set, side_of(solid, cut, true)) + hull_volume_m3(set, side_of(solid, cut, false));
-    cuts[c] = std::move(cut);
+    const HalfSpace plane{axis, low + quantiles[c % quantiles.size()] * (high - low)};
+    const auto below = std::count_if(mesh_centroids_m.begin(), mesh_centroids_m.end(),
+                                     [&](const Vec3d& at_m) { return plane.above_m(at_m) < 0; });
+    if (below == 0 || below == static_cast<std::ptrdiff_t>(mesh_centroids_m.size())) return;
+    cuts[c] = {plane, hull_volume_m3(set, solid, with(region, plane)) +
+                          hull_volume_m3(set, solid, with(region, other_side(plane)))};
   });
   return cuts;
 }
 
 bool encloses_less(const Cut& a, const Cut& b) { return a.volume_m3 < b.volume_m3; }
 
-/// Hull volume of a side, or of its halves where cutting it once more encloses less.
-double volume_after_next_cut_m3(const SolidSet& set, const Solid& side) {
-  double least = hull_volume_m3(set, side);
-  for (const Cut& cut : plane_cuts(set, side, kNextQuantiles)) least = std::min(least, cut.volume_m3);
+/// Hull volume in the region, or of the halves where cutting it once more encloses less.
+double volume_after_next_cut_m3(const SolidSet& set, const Solid& solid, const Region& region) {
+  double least = hull_volume_m3(set, solid, region);
+  for (const Cut& cut : plane_cuts(set, solid, region, kNextQuantiles))
+    least = std::min(least, cut.volume_m3);
   return least;
 }
 
@@ -167,23 +201,23 @@ std::vector<Cell> close_segments(SolidSet& set, const Solid& whole, const Decomp
   return cells;
 }
 
-std::vector<std::vector<bool>> plane_cuts_by_merit(const SolidSet& set, const Solid& solid) {
-  std::vector<Cut> cuts = plane_cuts(set, solid, kQuantiles);
+std::vector<HalfSpace> plane_cuts_by_merit(const SolidSet& set, const Solid& solid) {
+  std::vector<Cut> cuts = plane_cuts(set, solid, {}, kQuantiles);
   // The best of each axis is judged by what one more cut of both sides leaves. Halving a ring across gains
   // nothing at once and much at the next cut; slicing it flat gains nothing at either.
   std::vector<Cut> best_of_axis;
   for (std::size_t begin = 0; begin < cuts.size(); begin += kQuantiles.size()) {
     const auto first = cuts.begin() + static_cast<std::ptrdiff_t>(begin);
-    Cut& cut = *std::min_element(first, first + kQuantiles.size(), encloses_less);
-    if (cut.first_side.empty()) continue;
-    cut.volume_m3 = volume_after_next_cut_m3(set, side_of(solid, cut, true)) +
-                    volume_after_next_cut_m3(set, side_of(solid, cut, false));
-    best_of_axis.push_back(std::move(cut));
+    Cut cut = *std::min_element(first, first + kQuantiles.size(), encloses_less);
+    if (std::isinf(cut.volume_m3)) continue;
+    cut.volume_m3 = volume_after_next_cut_m3(set, solid, {cut.plane}) +
+                    volume_after_next_cut_m3(set, solid, {other_side(cut.plane)});
+    best_of_axis.push_back(cut);
   }
   std::stable_sort(best_of_axis.begin(), best_of_axis.end(), encloses_less);
-  std::vector<std::vector<bool>> sides;
-  for (Cut& cut : best_of_axis) sides.push_back(std::move(cut.first_side));
-  return sides;
+  std::vector<HalfSpace> planes;
+  for (const Cut& cut : best_of_axis) planes.push_back(cut.plane);
+  return planes;
 }
 
 }  // namespace sqmap::bake

@@ -21,8 +21,8 @@ struct Cell {
 std::vector<Cell> close_segments(SolidSet& set, const Solid& whole, const Decomposition& segments);
 
 /// The planes to cut a cell in two by, best first: of planes across each of its principal axes, the one after
-/// which the convex hulls enclose least volume. Whole triangles go to the side of their centroid. Entry k of
-/// a cut: triangle k goes to the first side. Empty when no plane leaves triangles of the mesh on both sides.
-std::vector<std::vector<bool>> plane_cuts_by_merit(const SolidSet& set, const Solid& solid);
+/// which the convex hulls enclose least volume. Empty when no plane leaves triangles of the mesh on both
+/// sides.
+std::vector<HalfSpace> plane_cuts_by_merit(const SolidSet& set, const Solid& solid);
 
 }  // namespace sqmap::bake

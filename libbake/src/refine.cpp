@@ -232,9 +232,8 @@ class Refiner {
   /// Puts the halves of piece k in its place and at the end.
   Outcome split(std::size_t k, std::size_t which) {
     const Cell& whole = pieces[k].cell;
-    const std::vector<bool>& cut = (*pieces[k].cuts)[which];
     Cell first{{}, whole.segment, CutReason::kErrorTarget}, second = first;
-    std::tie(first.solid, second.solid) = set_.split(whole.solid, [&](std::size_t t) { return cut[t]; });
+    std::tie(first.solid, second.solid) = set_.split(whole.solid, (*pieces[k].cuts)[which]);
     auto a = draft_piece(set_, std::move(first), queries_, options_.fit);
     auto b = draft_piece(set_, std::move(second), queries_, options_.fit);
     if (!a) return a.error();

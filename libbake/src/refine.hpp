@@ -22,9 +22,9 @@ struct Spare {
 struct Piece {
   Cell cell;
   Part part;
-  std::optional<std::vector<std::vector<bool>>> cuts;  ///< planes to split it by, best first
-  std::size_t cuts_tried{};                            ///< of them, those that did not pay
-  std::optional<Spare> spare;                          ///< of those, the one that cost least
+  std::optional<std::vector<HalfSpace>> cuts;  ///< planes to split it by, best first
+  std::size_t cuts_tried{};                    ///< of them, those that did not pay
+  std::optional<Spare> spare;                  ///< of those, the one that cost least
 };
 
 struct Refinement {

@@ -2,6 +2,7 @@
 #include "solid.hpp"
 
 #include <algorithm>
+#include <map>
 #include <numeric>
 
 namespace sqmap::bake {
@@ -114,6 +115,69 @@ std::pair<Solid, Solid> SolidSet::split(const Solid& solid,
   }
   close(first, &second);
   return {std::move(first), std::move(second)};
+}
+
+/// Caps with the edges between two of them cut where they cross the plane. Edges that a cap shares with the
+/// mesh stay whole: the triangle behind them does.
+Solid SolidSet::with_caps_cut(const Solid& solid, const HalfSpace& plane) {
+  std::map<Edge, std::uint32_t> middle;  // of edges from the lower to the higher vertex; kNewFace: none yet
+  const auto edge_of = [](std::uint32_t a, std::uint32_t b) { return Edge{std::min(a, b), std::max(a, b)}; };
+  for (std::size_t k = 0; k < solid.triangles.size(); ++k) {
+    if (solid.face[k] != kNewFace) continue;
+    const auto& t = solid.triangles[k];
+    for (std::size_t side = 0; side < 3; ++side) {
+      const auto [a, b] = edge_of(t[side], t[(side + 1) % 3]);
+      if ((plane.above_m(vertices_m[a]) < 0) != (plane.above_m(vertices_m[b]) < 0)) middle[{a, b}] = kNewFace;
+    }
+  }
+  for (std::size_t k = 0; k < solid.triangles.size() && !middle.empty(); ++k) {
+    if (solid.face[k] == kNewFace) continue;
+    const auto& t = solid.triangles[k];
+    for (std::size_t side = 0; side < 3; ++side) middle.erase(edge_of(t[side], t[(side + 1) % 3]));
+  }
+  if (middle.empty()) return solid;
+  for (auto& [edge, vertex] : middle) {
+    const Vec3d &a = vertices_m[edge.first], &b = vertices_m[edge.second];
+    const double from_m = plane.above_m(a), to_m = plane.above_m(b);
+    vertex = static_cast<std::uint32_t>(vertices_m.size());
+    vertices_m.push_back(a + from_m / (from_m - to_m) * (b - a));
+  }
+  Solid result;
+  const auto add = [&](std::uint32_t a, std::uint32_t b, std::uint32_t c, std::uint32_t face) {
+    result.triangles.push_back({a, b, c});
+    result.face.push_back(face);
+  };
+  for (std::size_t k = 0; k < solid.triangles.size(); ++k) {
+    const auto& t = solid.triangles[k];
+    std::array<std::uint32_t, 3> cut{kNewFace, kNewFace, kNewFace};
+    std::size_t cuts = 0, whole = 0;  // edges cut; the last edge that is not
+    for (std::size_t side = 0; side < 3 && solid.face[k] == kNewFace; ++side) {
+      const auto found = middle.find(edge_of(t[side], t[(side + 1) % 3]));
+      if (found == middle.end()) {
+        whole = side;
+        continue;
+      }
+      cut[side] = found->second;
+      ++cuts;
+    }
+    if (cuts == 0) {
+      add(t[0], t[1], t[2], solid.face[k]);
+      continue;
+    }
+    if (cuts == 1)
+      whole = cut[0] != kNewFace ? 2 : cut[1] != kNewFace ? 0 : 1;  // the edge before the cut one
+    const std::uint32_t a = t[whole], b = t[(whole + 1) % 3], c = t[(whole + 2) % 3];
+    const std::uint32_t bc = cut[(whole + 1) % 3], ca = cut[(whole + 2) % 3];
+    add(a, b, bc, kNewFace);
+    if (cuts == 2) add(a, bc, ca, kNewFace);
+    add(cuts == 2 ? ca : a, bc, c, kNewFace);
+  }
+  return result;
+}
+
+std::pair<Solid, Solid> SolidSet::split(const Solid& solid, const HalfSpace& first_side) {
+  const Solid cut = with_caps_cut(solid, first_side);
+  return split(cut, [&](std::size_t k) { return first_side.above_m(centroid(cut.triangles[k])) < 0; });
 }
 
 double SolidSet::volume_m3(const Solid& solid) const {

@@ -11,6 +11,13 @@
 
 namespace sqmap::bake {
 
+/// The points p with normal . p < height.
+struct HalfSpace {
+  Vec3d normal;
+  double height_m{};
+  double above_m(const Vec3d& p_m) const { return dot(normal, p_m) - height_m; }
+};
+
 /// A part of the mesh with its cuts closed: a 2-chain without boundary.
 ///
 /// Every cut is closed by cones over the connected pieces of its boundary, and the two sides get the same
@@ -33,12 +40,20 @@ struct SolidSet {
   std::pair<Solid, Solid> split(const Solid& solid,
                                 const std::function<bool(std::size_t triangle)>& first_side);
 
+  /// Both sides of a plane, first the half-space. Triangles of the mesh go whole to the side of their
+  /// centroid; caps are cut where the plane meets them, so that neither side holds what lies far beyond it.
+  std::pair<Solid, Solid> split(const Solid& solid, const HalfSpace& first_side);
+
+  Vec3d centroid(const std::array<std::uint32_t, 3>& triangle) const {
+    return (1.0 / 3) * (vertices_m[triangle[0]] + vertices_m[triangle[1]] + vertices_m[triangle[2]]);
+  }
   double volume_m3(const Solid& solid) const;
   /// Distinct vertices of the solid's triangles, ascending by index.
   std::vector<Vec3d> points(const Solid& solid) const;
 
  private:
   void close(Solid& solid, Solid* other);
+  Solid with_caps_cut(const Solid& solid, const HalfSpace& plane);
 };
 
 }  // namespace sqmap::bake

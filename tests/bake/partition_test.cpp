@@ -36,5 +36,21 @@ TEST(CloseSegments, CapsStayWithWhatTheyClose) {
   EXPECT_NEAR(volume_m3, set.volume_m3(whole), 1e-9);
 }
 
+TEST(Solid, PlanesCutTheCapsOfEarlierCuts) {
+  const Mesh mesh = test::ellipsoid({1, 1, 3}, 4);
+  auto [set, whole] = SolidSet::whole(mesh);
+  const auto [half, rest] = set.split(whole, HalfSpace{{1, 0, 0}, 0.1});
+  // Its cap is one fan from end to end.
+  const auto [low, high] = set.split(half, HalfSpace{{0, 0, 1}, -1});
+  EXPECT_GT(set.volume_m3(low), 0.1);
+  EXPECT_NEAR(set.volume_m3(low) + set.volume_m3(high), set.volume_m3(half), 1e-12);
+  for (const Vec3d& p : set.points(low)) EXPECT_LT(p.z, -0.8);
+  for (const Vec3d& p : set.points(high)) EXPECT_GT(p.z, -1.2);
+  // Closed: the volume does not depend on the origin.
+  SolidSet moved = set;
+  for (Vec3d& v : moved.vertices_m) v = v + Vec3d{10, -20, 30};
+  for (const Solid* solid : {&low, &high}) EXPECT_NEAR(moved.volume_m3(*solid), set.volume_m3(*solid), 1e-9);
+}
+
 }  // namespace
 }  // namespace sqmap::bake
