@@ -35,11 +35,13 @@ constexpr double kVertexTolerance = 2;
 constexpr std::uint32_t kShellPoints = 4000;
 constexpr double kShellWidth = 0.03;
 // Maps are drawn at most so often, each time for this share of the target before, while that takes a fourth
-// off the error and the error exceeds the target by a tenth.
+// off an error that exceeds its aim: the target and a tenth for depth, and fifteen times the target, as a
+// share of R_max, for the share of points on the wrong side.
 constexpr int kMapRounds = 4;
 constexpr double kStricter = 0.4;
 constexpr double kWorthFinerMaps = 0.75;
 constexpr double kNearTarget = 1.1;
+constexpr double kWrongSides = 15;
 // Parts take whole triangles. So that long ones do not tie together what should be cut, edges are halved down
 // to this share of R_max first, as far as the number of added triangles allows.
 constexpr double kLongestEdge = 1.0 / 16;
@@ -206,7 +208,7 @@ Result<bool> draw_maps(Asset& asset, const std::vector<double>& areas_m2, const 
                        const MapTarget& target, std::uint64_t seed) {
   const ShellPoints shell = sample_shell(queries, kShellWidth * asset.r_max_m, kShellPoints, seed);
   std::vector<Part> best;
-  double least_m = std::numeric_limits<double>::infinity();
+  double depth_in_aims = 0, sides_in_aims = 0;
   bool by_budget = false;
   MapTarget stricter = target;
   MapDrawer drawer(asset.parts, areas_m2, queries);
@@ -217,12 +219,18 @@ Result<bool> draw_maps(Asset& asset, const std::vector<double>& areas_m2, const 
     });
     auto object = runtime::Object::build(asset);
     if (!object) return object.error();
-    const double error_m = mean_depth_error_m(object.value(), shell);
-    if (error_m > kWorthFinerMaps * least_m) break;
-    least_m = error_m;
+    const ShellError error = shell_error(object.value(), shell);
+    const double depth = error.depth_mean_m / (kNearTarget * target.error_m);
+    const double sides = error.misclassified * asset.r_max_m / (kWrongSides * target.error_m);
+    const auto gains = [](double now, double before) {
+      return before > 1 && now <= kWorthFinerMaps * before;
+    };
+    if (round > 0 && !gains(depth, depth_in_aims) && !gains(sides, sides_in_aims)) break;
+    depth_in_aims = depth;
+    sides_in_aims = sides;
     best = asset.parts;
     by_budget = budget_decided;
-    if (by_budget || least_m <= kNearTarget * target.error_m) break;
+    if (by_budget || std::max(depth, sides) <= 1) break;
   }
   asset.parts = std::move(best);
   return by_budget;

@@ -155,8 +155,9 @@ double mean(const std::vector<double>& values) {
 
 }  // namespace
 
-double mean_depth_error_m(const runtime::Object& object, const ShellPoints& shell) {
-  return mean(depth_errors_m(ask(object, shell, {runtime::Layer::kThree, 0}), shell));
+ShellError shell_error(const runtime::Object& object, const ShellPoints& shell) {
+  const Told told = ask(object, shell, {runtime::Layer::kThree, 0});
+  return {mean(depth_errors_m(told, shell)), misclassified_percent(told, shell) / 100};
 }
 
 ShellPoints sample_shell(const MeshQueries& queries, double half_width_m, std::uint32_t count,

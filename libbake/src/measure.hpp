@@ -30,8 +30,12 @@ ShellPoints sample_shell(const MeshQueries& queries, double half_width_m, std::u
 std::vector<ErrorRow> measure(const Asset& asset, const runtime::Object& object, const MeshQueries& queries,
                               std::uint32_t sample_count, std::uint64_t seed);
 
-/// Mean signed-distance error of layer 3 [m], as ErrorRow::depth_mean_percent defines it.
-double mean_depth_error_m(const runtime::Object& object, const ShellPoints& shell);
+/// What layer 3 tells wrong of the shell points, as ErrorRow defines it.
+struct ShellError {
+  double depth_mean_m{};
+  double misclassified{};  ///< share of the points
+};
+ShellError shell_error(const runtime::Object& object, const ShellPoints& shell);
 
 /// Mean |reported - true| signed distance over the shell points, by the part that owns each point's face [m].
 /// An unknown distance, or a wrong side, counts as `worst_m`. Shape [part_count]; `share` gets the points of
