@@ -93,7 +93,9 @@ class HullsPeer : public Peer {
   HullsPeer(const Model& model, std::size_t least_hulls)
       : near_(model), band_m_(static_cast<float>(kBand * model.r_max_m())) {
     float deepest_m = band_m_;
-    for (const std::vector<Vec3d>& corners : decomposed(model.mesh, least_hulls)) {
+    auto& hulls = model.hulls[least_hulls];
+    if (hulls.empty()) hulls = decomposed(model.mesh, least_hulls);
+    for (const std::vector<Vec3d>& corners : hulls) {
       Hull hull{std::make_unique<btConvexHullShape>(), cast<float>(corners.front()),
                 cast<float>(corners.front())};
       for (const Vec3d& corner : corners) {
