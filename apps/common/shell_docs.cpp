@@ -208,8 +208,8 @@ std::string zsh_script(const CLI::App& program) {
       for (const std::string& each : names_of(*option)) {
         std::string spec = each + "[" + help + "]";
         if (takes_value(*option))
-          spec +=
-              ":" + replaced(option->get_type_name(), ":", " ") + ":" + (takes_path(*option) ? "_files" : "");
+          spec += fmt::format(":{}:{}", replaced(option->get_type_name(), ":", " "),
+                              takes_path(*option) ? "_files" : "");
         script += " \\\n    " + shell_quoted(spec);
       }
     }
