@@ -134,8 +134,9 @@ class PaperPart {
     const Vec3f& a = shape_.semi_axes_m;
     const float along = superellipse_norm(std::abs(m.x) / a.x, std::abs(m.y) / a.y, shape_.e2);
     const float eta = std::atan2(m.z / a.z, along), omega = std::atan2(m.y / a.y, m.x / a.x);
-    std::int32_t row = fine_ * nearest((eta / kPi + 0.5F) * static_cast<float>((rows_ - 1) / fine_));
-    std::int32_t col = fine_ * nearest((omega / kPi + 1) * 0.5F * static_cast<float>(cols_ / fine_));
+    const std::int32_t coarse_rows = (rows_ - 1) / fine_, coarse_cols = cols_ / fine_;
+    std::int32_t row = fine_ * nearest((eta / kPi + 0.5F) * static_cast<float>(coarse_rows));
+    std::int32_t col = fine_ * nearest((omega / kPi + 1) * 0.5F * static_cast<float>(coarse_cols));
     const std::int32_t row_way = way(eta, shape_.e1), col_way = way(omega, shape_.e2);
     float best = -1;
     std::int32_t best_row = row, best_col = col;
