@@ -2,8 +2,6 @@
 // Claims over random points and paths. Each says which branches its cases took, and fails where one was never
 // taken.
 #include <cmath>
-#include <cstdlib>
-#include <map>
 #include <string>
 
 #include <gtest/gtest.h>
@@ -13,42 +11,18 @@
 #include "sqmap/runtime/object.hpp"
 
 #include "hard/shells.hpp"
+#include "support/branches.hpp"
 #include "support/mixed_asset.hpp"
 
 namespace sqmap::runtime {
 namespace {
 
-// Read by RapidCheck before its first case; a value from outside wins, so that more cases can be asked for.
-const bool kIsSeeded = setenv("RC_PARAMS", "seed=2007 max_success=1000", 0) == 0;
+const bool kIsSeeded = test::seed_rapidcheck("seed=2007 max_success=1000");
 
-/// Counts the branches that cases take; the test that owns it fails where one has fewer than it should.
-class Branches {
- public:
-  void take(const std::string& name) { ++taken_[name]; }
-  void expect(const std::vector<std::string>& names, int least) const {
-    for (const std::string& name : names) {
-      const auto at = taken_.find(name);
-      EXPECT_GE(at == taken_.end() ? 0 : at->second, least) << "branch \"" << name << "\" was hardly taken";
-    }
-  }
-
- private:
-  std::map<std::string, int> taken_;
-};
-
-/// Checks a property without rapidcheck's macro, so that the branches can be looked at afterwards.
-template <class Property>
-void check(const Property& property) {
-  ASSERT_TRUE(kIsSeeded);
-  EXPECT_TRUE(rc::check(property));
-}
-
-/// A number of [-1, 1], all alike likely from the first case on; shrinks towards 0.
-double share() { return *rc::gen::resize(rc::kNominalSize, rc::gen::inRange(-100000, 100001)) / 100000.0; }
-Vec3d vector() {
-  const double x = share(), y = share();
-  return {x, y, share()};
-}
+using test::Branches;
+using test::check;
+using test::share;
+using test::vector;
 
 Object built(const Asset& asset) { return std::move(Object::build(asset)).value(); }
 
