@@ -174,6 +174,24 @@ TEST(Bundle, NewerVersionIsRefusedWithBothVersions) {
   }
 }
 
+TEST(Bundle, AnOlderVersionIsRefusedWithAnotherRemedyThanANewerOne) {
+  const auto refusal = [](std::uint32_t major, std::uint32_t minor) {
+    Bytes bytes = encoded(rich_asset());
+    std::memcpy(bytes.data() + 8, &major, 4);
+    std::memcpy(bytes.data() + 12, &minor, 4);
+    const auto decoded = io::decode(bytes);
+    EXPECT_FALSE(decoded);
+    return decoded ? Error{} : decoded.error();
+  };
+  for (const std::uint32_t minor : {0U, 1U, 9U}) {
+    const Error older = refusal(0, minor);
+    EXPECT_EQ(older.status, Status::kUnsupportedVersion);
+    EXPECT_NE(older.finding.find("version 0." + std::to_string(minor)), std::string::npos) << older.finding;
+    EXPECT_EQ(older.remedy, "bake the asset again");
+  }
+  EXPECT_NE(refusal(kFormatMajor + 1, 0).remedy.find("newer sqmap"), std::string::npos);
+}
+
 TEST(Bundle, LimitsAreKept) {
   const Bytes bytes = encoded(rich_asset());
   EXPECT_FALSE(io::decode(bytes, {bytes.size() - 1, 1 << 20}));

@@ -93,6 +93,31 @@ Edit chunked(const Shape& shape) {
   };
 }
 
+/// HDF5's id for filters under test; nothing in HDF5 or here knows it.
+constexpr H5Z_filter_t kStrangeFilter = 300;
+
+/// Puts the filter in line while it is registered with HDF5, as a plugin would be.
+Edit with_strange_filter(const Edit& prepare) {
+  return [prepare](hid_t file) {
+    const H5Z_class2_t dummy{H5Z_CLASS_T_VERS,
+                             kStrangeFilter,
+                             1,
+                             1,
+                             "dummy",
+                             nullptr,
+                             nullptr,
+                             [](unsigned, std::size_t, const unsigned*, std::size_t bytes, std::size_t*,
+                                void**) { return bytes; }};
+    EXPECT_GE(H5Zregister(&dummy), 0);
+    replace(file, "/maps/code", H5T_STD_U16LE, kCodeShape, prepare, [](hid_t dataset) {
+      const std::vector<std::uint16_t> codes(kCodeShape[0]);
+      EXPECT_GE(H5Dwrite(dataset, H5T_NATIVE_UINT16, H5S_ALL, H5S_ALL, H5P_DEFAULT, codes.data()), 0);
+    });
+    H5Fflush(file, H5F_SCOPE_LOCAL);
+    EXPECT_GE(H5Zunregister(kStrangeFilter), 0);
+  };
+}
+
 /// A chunk that inflates to `size` zeros, whatever the dataset declares.
 Edit chunk_of_zeros(std::size_t size) {
   return [size](hid_t dataset) {
@@ -316,6 +341,36 @@ TEST(Hostile, OtherFiltersAreRefused) {
       EXPECT_GE(H5Pset_filter(creation, H5Z_FILTER_NBIT, H5Z_FLAG_OPTIONAL, 0, nullptr), 0);
     });
   });
+}
+
+TEST(Hostile, FiltersThatHdf5DoesNotKnowAreRefused) {
+  const auto add_strange = [](hid_t creation) {
+    EXPECT_GE(H5Pset_filter(creation, kStrangeFilter, H5Z_FLAG_MANDATORY, 0, nullptr), 0);
+  };
+  expect_refused("filters", with_strange_filter([&](hid_t creation) {  // on top of those required
+                   chunked(kCodeShape)(creation);
+                   add_strange(creation);
+                 }));
+  expect_refused("filters", with_strange_filter([&](hid_t creation) {  // in the place of one
+                   H5Pset_chunk(creation, 1, kCodeShape.data());
+                   H5Pset_shuffle(creation);
+                   add_strange(creation);
+                   H5Pset_fletcher32(creation);
+                 }));
+}
+
+TEST(Hostile, ChunksThatWentPastAFilterAreRefused) {
+  const std::vector<std::uint16_t> codes(kCodeShape[0]);
+  const auto store_past = [&](std::uint32_t skipped) {
+    return [&codes, skipped](hid_t dataset) {
+      const hsize_t origin = 0;
+      EXPECT_GE(H5Dwrite_chunk(dataset, H5P_DEFAULT, skipped, &origin, 2 * codes.size(), codes.data()), 0);
+    };
+  };
+  for (const std::uint32_t skipped : {1U, 2U, 4U, 7U})
+    expect_refused("went past a filter", [&](hid_t file) {
+      replace(file, "/maps/code", H5T_STD_U16LE, kCodeShape, chunked(kCodeShape), store_past(skipped));
+    });
 }
 
 TEST(Hostile, OtherTypesAreRefused) {
