@@ -3,8 +3,10 @@
 stay; limits end it; the records say how it ended; nothing is left behind."""
 import json
 import os
+import shutil
 import signal
 import subprocess
+import sys
 import time
 import unittest
 from pathlib import Path
@@ -156,6 +158,45 @@ class Isolation(FolderTest):
             self.assert_exit(run("sqbake", "bake", source, *ROUGH, "-o", output, *options), 0)
             bundles.append(output.read_bytes())
         self.assertEqual(bundles, bundles[:1] * 4)
+
+    def comma_locale(self):
+        """Environment of a locale that writes 0,5 for a half, made for this test."""
+        if shutil.which("localedef") is None:
+            self.skipTest("no localedef, which makes the locale")
+        made = subprocess.run(["localedef", "-i", "de_DE", "-f", "UTF-8", str(self.folder / "de_DE.UTF-8")],
+                              capture_output=True, text=True, check=False)
+        environment = {"LOCPATH": str(self.folder), "LC_ALL": "de_DE.UTF-8"}
+        probe = "import locale; locale.setlocale(locale.LC_ALL, ''); print(locale.localeconv()['decimal_point'])"
+        point = subprocess.run([sys.executable, "-c", probe], env=os.environ | environment, capture_output=True, text=True,
+                               check=False).stdout.strip()
+        if point != ",":
+            self.skipTest(f"no locale with a decimal comma: {made.stderr.strip()}")
+        return environment
+
+    def test_neither_threads_nor_place_nor_surroundings_change_a_byte(self):
+        locale = self.comma_locale()
+        mesh = bent(3, 1)
+        source, elsewhere = self.models / "b.off", self.folder / "a folder" / "of another name"
+        elsewhere.mkdir(parents=True)
+        for folder in (self.models, elsewhere):
+            write_off(folder / "b.off", mesh)
+        bundles = {}
+
+        def bake(case, *options, mesh=source, **surroundings):
+            output = self.folder / f"{case}.h5"
+            self.assert_exit(run("sqbake", "bake", mesh, *ROUGH, "-o", output, *options, **surroundings), 0)
+            bundles[case] = output.read_bytes()
+
+        bake("one thread", "-j1")
+        bake("two threads", "-j2")
+        bake("sixteen threads", "-j16")
+        bake("another folder", mesh=elsewhere / "b.off")
+        bake("another working directory", mesh="b.off", cwd=elsewhere)
+        bake("another umask", umask=0o077)
+        bake("a decimal comma", env=os.environ | locale)
+        bake("another time zone", env=os.environ | {"TZ": "Pacific/Kiritimati"})
+        self.assertEqual({case: bundle == bundles["one thread"] for case, bundle in bundles.items()},
+                         dict.fromkeys(bundles, True))
 
     def test_verify_determinism_bakes_a_second_time(self):
         source = write_off(self.models / "b.off", bent(3, 1))
