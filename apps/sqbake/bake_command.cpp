@@ -4,8 +4,8 @@
 #include <memory>
 #include <string>
 #include <string_view>
-#include <system_error>
 #include <utility>
+#include <vector>
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
@@ -16,6 +16,7 @@
 #include "depfile.hpp"
 #include "dry_run.hpp"
 #include "job_list.hpp"
+#include "overwrite.hpp"
 #include "plan/shard_jobs.hpp"
 #include "report/report_page.hpp"
 #include "settings.hpp"
@@ -24,19 +25,27 @@
 namespace sqmap::apps {
 namespace {
 
-/// A report takes the place of whatever file has its name, so it must look like one.
-Outcome check_report(const std::filesystem::path& file) {
-  if (file.empty()) return Done{};
-  if (file.extension() != ".html")
-    return Error{Status::kBadOption, fmt::format("--report {}: a report's name ends in .html", file.string()),
-                 "choose a name that ends in .html"};
-  std::error_code code;
-  const std::filesystem::path folder = file.has_parent_path() ? file.parent_path() : ".";
-  if (!std::filesystem::is_directory(folder, code))
-    return Error{Status::kFileUnwritable,
-                 fmt::format("--report {}: no folder {}", file.string(), folder.string()),
-                 "make the folder, or name another file"};
-  return Done{};
+/// Whether the files that are written beside the bundles may be written where they shall be.
+Outcome check_side_outputs(const BakeArguments& arguments, const JobList& list) {
+  const std::filesystem::path &report = arguments.report, &depfile = arguments.depfile;
+  if (report.empty() && depfile.empty()) return Done{};
+  std::vector<std::filesystem::path> read, bundles;
+  for (const Job& job : list.jobs) {
+    read.push_back(job.input);
+    read.insert(read.end(), job.config_files.begin(), job.config_files.end());
+    bundles.push_back(job.output);
+  }
+  if (!report.empty()) {
+    if (const Outcome ok = check_page("--report", report, bundles); !ok) return ok.error();
+    if (const Outcome ok = check_apart("--report", report, "an input", read); !ok) return ok.error();
+  }
+  if (depfile.empty()) return Done{};
+  if (const Outcome ok = check_apart("--depfile", depfile, "an input", read); !ok) return ok.error();
+  if (const Outcome ok = check_apart("--depfile", depfile, "an output", bundles); !ok) return ok.error();
+  if (!report.empty() && is_same_file(depfile, report))
+    return Error{Status::kBadOption, fmt::format("--depfile {}: is the report, too", depfile.string()),
+                 "name another file"};
+  return check_depfile(depfile, arguments.request.force, bundles);
 }
 
 Outcome write_run_report(const BakeArguments& arguments, std::string_view record_lines) {
@@ -66,11 +75,11 @@ Exit run_bake(Console& console, const BakeArguments& arguments) {
     if (!shard) return refuse(shard.error());
     keep_shard(list.value(), shard.value());
   }
+  if (const Outcome ok = check_side_outputs(arguments, list.value()); !ok) return refuse(ok.error());
   if (arguments.dry_run) {
     print_plan(console, list.value(), arguments);
     return Exit::kOk;
   }
-  if (const Outcome ok = check_report(arguments.report); !ok) return refuse(ok.error());
   if (const Outcome ok = prepare_folders(list.value(), arguments.request); !ok) return refuse(ok.error());
   install_stop_signals();
   const std::vector<Job> jobs = arguments.depfile.empty() ? std::vector<Job>() : list.value().jobs;
@@ -118,7 +127,8 @@ void add_input_options(CLI::App& app, JobRequest& request) {
       ->type_name("DIR");
   app.add_flag("--recursive", request.recursive, "Look below the folders named, too");
   app.add_flag("--keep-extension", request.keep_extension, "Call the bundles NAME.off.h5, not NAME.h5");
-  app.add_flag("--force", request.force, "Overwrite files that are not sqmap bundles");
+  app.add_flag("--force", request.force,
+               "Overwrite files that are not sqmap bundles, and a --depfile that is none");
 }
 
 void add_run_options(CLI::App& app, BakeArguments& arguments) {

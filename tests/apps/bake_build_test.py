@@ -137,6 +137,39 @@ class Depfile(FolderTest):
         self.assertEqual({Path(name).name for name in self.check(self.models / "a.off")},
                          {"a.off", "sqbake.toml", "a.sqbake.toml"})
 
+    def refuse(self, code, named, *arguments):
+        before = {name: (self.folder / name).read_bytes() for name in self.files()}
+        result = run("sqbake", "bake", self.models / "a.off", *ROUGH, *arguments)
+        self.assert_exit(result, code)
+        self.assertIn(named, result.stderr)
+        self.assertEqual({name: (self.folder / name).read_bytes() for name in self.files()}, before)
+
+    def test_it_takes_the_place_of_a_depfile_only(self):
+        write_off(self.models / "a.off", box())
+        other = write_off(self.models / "b.off", box())
+        (self.models / "a.sqbake.toml").write_text("max-parts = 1\n", encoding="ascii")
+        (self.models / "link.d").symlink_to("a.off")
+        (self.folder / "notes.d").write_text("buy: milk\n", encoding="ascii")
+        output = self.folder / "out.h5"
+        for file, code, named in ((other, 3, "not a depfile"), (self.models / "a.off", 2, "an input"),
+                                  (self.models / "link.d", 2, "an input"), (output, 2, "an output"),
+                                  (self.models / "a.sqbake.toml", 2, "an input"), (self.models, 3, "is a folder"),
+                                  (self.folder / "none" / "out.d", 3, "no folder"),
+                                  (self.folder / "notes.d", 3, "--force")):
+            for dry in ((), ("-n",)):
+                with self.subTest(file=file.name, dry=dry):
+                    self.refuse(code, named, "-o", output, "--depfile", file, *dry)
+        self.refuse(2, "an output", "--out-dir", self.folder / "new", "--depfile", self.folder / "new" / "a.h5")
+        for name, options in (("notes.d", ("--force",)), ("empty.d", ())):
+            if not options:
+                (self.folder / name).touch()
+            for again in (options, ()):
+                self.assert_exit(run("sqbake", "bake", self.models / "a.off", *ROUGH, "-o", output, "--depfile",
+                                     self.folder / name, *again), 0)
+            self.assertIn("a.off", (self.folder / name).read_text(encoding="utf-8"))
+        self.assert_exit(run("sqbake", "bake", self.models / "a.off", *ROUGH, "--out-dir", self.folder / "new",
+                             "--depfile", self.folder / "new" / "a.d"), 0)
+
 
 @unittest.skipUnless(shutil.which("ninja"), "needs ninja")
 class Ninja(FolderTest):
