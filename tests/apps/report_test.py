@@ -133,6 +133,30 @@ class Report(FolderTest):
             self.assertIn(named, result.stderr)
         self.assertEqual(self.files(), ["ball.off"])
 
+    def test_neither_a_page_nor_a_merge_takes_the_place_of_its_input_or_of_a_foreign_file(self):
+        line = json.dumps(self.record("a.off", parts=1)) + "\n"
+        for name in ("x.ndjson", "x.html", "notes.txt", "plan.ndjson"):
+            (self.folder / name).write_text(line, encoding="ascii")
+        (self.folder / "link.html").symlink_to("x.ndjson")
+        before = {name: (self.folder / name).read_bytes() for name in self.files()}
+        cases = [(("report", "x.ndjson", "-o", "x.ndjson"), 2, "an input"),
+                 (("report", "x.html", "-o", "./x.html"), 2, "an input"),
+                 (("report", "x.ndjson", "-o", "link.html"), 2, "an input"),
+                 (("report", "x.ndjson", "-o", "notes.txt"), 2, ".html"),
+                 (("report", "x.ndjson", "-o", "none/x.html"), 3, "no folder"),
+                 (("merge", "x.ndjson", "-o", "x.ndjson"), 2, "an input"),
+                 (("merge", "x.ndjson", "--plan", "plan.ndjson", "-o", "plan.ndjson"), 2, "an input"),
+                 (("merge", "x.ndjson", "--report", "notes.txt"), 2, ".html"),
+                 (("merge", "x.html", "--report", "x.html"), 2, "an input"),
+                 (("merge", "x.ndjson", "-o", "new.html", "--report", "new.html"), 2, "the output")]
+        for arguments, code, named in cases:
+            with self.subTest(arguments=arguments):
+                result = run("sqbake", *arguments, cwd=self.folder)
+                self.assert_exit(result, code)
+                self.assertEqual(result.stdout, "")
+                self.assertIn(named, result.stderr)
+                self.assertEqual({name: (self.folder / name).read_bytes() for name in self.files()}, before)
+
     def test_names_from_strangers_stay_text(self):
         name = "<script>alert(1)</script>\"'&.off"
         error = {"status": 9, "id": "bake-failed", "exit_code": 5, "finding": "<b>&", "remedy": "</table>"}

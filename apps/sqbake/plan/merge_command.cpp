@@ -13,6 +13,7 @@
 #include "../../common/files.hpp"
 #include "../../common/json_text.hpp"
 #include "../commands.hpp"
+#include "../overwrite.hpp"
 #include "../report/report_page.hpp"
 #include "merge.hpp"
 
@@ -59,11 +60,28 @@ std::string merged_text(const MergedRecords& merged) {
   return text + json_line(summary);
 }
 
+/// Whether the files to write may be written: none is an input, and a page looks like one.
+Outcome check_outputs(const MergeArguments& arguments) {
+  const std::filesystem::path &output = arguments.output, &report = arguments.report;
+  std::vector<std::filesystem::path> read = arguments.records;
+  if (!arguments.plan.empty()) read.push_back(arguments.plan);
+  const bool has_file = !output.empty() && output != "-";
+  if (has_file)
+    if (const Outcome ok = check_apart("-o", output, "an input", read); !ok) return ok.error();
+  if (report.empty()) return Done{};
+  if (const Outcome ok = check_apart("--report", report, "an input", read); !ok) return ok.error();
+  if (has_file)
+    if (const Outcome ok = check_apart("--report", report, "the output", {&output, 1}); !ok)
+      return ok.error();
+  return check_page("--report", report);
+}
+
 Exit run_merge(Console& console, const MergeArguments& arguments) {
   const auto refuse = [&](const Error& error) {
     console.error(error.remedy.empty() ? error.finding : error.finding + "; " + error.remedy);
     return exit_for(error.status);
   };
+  if (const Outcome ok = check_outputs(arguments); !ok) return refuse(ok.error());
   std::optional<std::vector<PlannedAsset>> plan;
   if (!arguments.plan.empty()) {
     const Result<std::vector<std::uint8_t>> bytes = read_file(arguments.plan, kLargestRecords);

@@ -9,6 +9,7 @@
 
 #include "../../common/files.hpp"
 #include "../commands.hpp"
+#include "../overwrite.hpp"
 #include "asset_records.hpp"
 #include "report_page.hpp"
 
@@ -28,6 +29,11 @@ Exit run_report(Console& console, const ReportArguments& arguments) {
     console.error(message_for(file, error));
     return exit_for(error.status);
   };
+  if (arguments.output != "-") {
+    Outcome ok = check_apart("-o", arguments.output, "an input", arguments.records);
+    if (ok) ok = check_page("-o", arguments.output);
+    if (!ok) return refuse("-o " + arguments.output.string(), ok.error());
+  }
   std::vector<AssetRecord> all;
   for (const std::filesystem::path& file : arguments.records) {
     const Result<std::vector<std::uint8_t>> bytes =
