@@ -76,6 +76,7 @@ Exit run_bake(Console& console, const BakeArguments& arguments) {
     keep_shard(list.value(), shard.value());
   }
   if (const Outcome ok = check_side_outputs(arguments, list.value()); !ok) return refuse(ok.error());
+  if (const Outcome ok = check_folders(list.value(), arguments.request); !ok) return refuse(ok.error());
   if (arguments.dry_run) {
     print_plan(console, list.value(), arguments);
     return Exit::kOk;

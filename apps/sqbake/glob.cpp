@@ -115,16 +115,19 @@ fs::path glob_root(std::string_view pattern) {
 Result<std::vector<fs::path>> files_below(const fs::path& folder, bool recursive) {
   std::vector<fs::path> found;
   std::error_code code;
-  fs::recursive_directory_iterator entry(folder, fs::directory_options::skip_permission_denied, code);
+  fs::recursive_directory_iterator entry(folder, code);
+  fs::path read = folder;  // what an error speaks of
   for (; !code && entry != fs::recursive_directory_iterator(); entry.increment(code)) {
     std::error_code type_code;
     const bool is_folder = entry->is_directory(type_code);
     const bool is_hidden = entry->path().filename().string().starts_with('.');
-    if (is_folder && (!recursive || is_hidden)) entry.disable_recursion_pending();
+    const bool is_entered = is_folder && recursive && !is_hidden;
+    if (!is_entered) entry.disable_recursion_pending();
+    read = is_entered ? entry->path() : folder;
     if (!is_folder && !is_hidden) found.push_back(entry->path());
   }
   if (code)
-    return Error{Status::kFileUnreadable, fmt::format("{}: {}", folder.string(), code.message()),
+    return Error{Status::kFileUnreadable, fmt::format("{}: {}", read.string(), code.message()),
                  "check the folder's permissions"};
   std::ranges::sort(found);
   return found;

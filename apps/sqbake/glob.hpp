@@ -22,7 +22,8 @@ bool glob_matches(std::string_view pattern, std::string_view path, bool anywhere
 std::filesystem::path glob_root(std::string_view pattern);
 
 /// Files below a folder, sorted; pipes and dangling links too. Names that start with a dot are left out,
-/// folders of that kind are not entered, links to folders are not followed. Errors: kFileUnreadable.
+/// folders of that kind are not entered, links to folders are not followed. Errors: kFileUnreadable, with the
+/// folder that cannot be entered.
 Result<std::vector<std::filesystem::path>> files_below(const std::filesystem::path& folder, bool recursive);
 
 /// The files that match, sorted. Errors: kFileMissing (glob_root is no folder), kFileUnreadable.

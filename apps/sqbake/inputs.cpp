@@ -41,6 +41,24 @@ Error without_meshes(const std::string& input, const char* where, const char* re
           fmt::format("{}: no file with a mesh extension ({}) {}", input, kMeshExtensionList, where), remedy};
 }
 
+Outcome check_readable(const fs::path& path) {
+  std::error_code code;
+  const fs::file_status status = fs::status(path, code);
+  if (status.type() == fs::file_type::not_found)
+    return Error{Status::kFileMissing, fmt::format("{}: no such file or folder", path.string()),
+                 "check the path"};
+  const bool is_known = fs::status_known(status);
+  if (is_known && !fs::is_regular_file(status))
+    return Error{Status::kFileUnreadable,
+                 fmt::format("{}: {}", path.string(), fs::is_directory(status) ? "is a folder" : "not a regular file"),
+                 "name a mesh file"};
+  if (!is_known || ::access(path.c_str(), R_OK) != 0)
+    return Error{Status::kFileUnreadable,
+                 fmt::format("{}: {}", path.string(), is_known ? std::strerror(errno) : code.message()),
+                 "check the file's permissions"};
+  return Done{};
+}
+
 class Lister {
  public:
   explicit Lister(bool recursive) : recursive_(recursive) {}
@@ -64,6 +82,7 @@ Outcome Lister::add_folder(const fs::path& folder, const std::string& input) {
   const std::size_t before = list.meshes.size();
   for (fs::path& file : files.value()) {
     if (!has_mesh_extension(file)) continue;
+    if (const Outcome ok = check_readable(file); !ok) return ok.error();
     fs::path place = file.lexically_relative(folder);
     list.meshes.push_back({std::move(file), std::move(place)});
   }
@@ -79,6 +98,7 @@ Outcome Lister::add_pattern(const fs::path& pattern, const std::string& input) {
   const std::size_t before = list.meshes.size();
   for (fs::path& file : files.value()) {
     if (!has_mesh_extension(file)) continue;
+    if (const Outcome ok = check_readable(file); !ok) return ok.error();
     fs::path place = root.empty() ? file : file.lexically_relative(root);
     list.meshes.push_back({std::move(file), std::move(place)});
   }
@@ -93,14 +113,8 @@ Outcome Lister::add(const std::string& input, const fs::path& base, bool listed)
   std::error_code code;
   const fs::file_status status = fs::status(path, code);
   if (fs::is_directory(status)) return add_folder(path, path.string());
-  if (!fs::exists(status)) {
-    if (is_glob(input)) return add_pattern(path, path.string());
-    return Error{Status::kFileMissing, fmt::format("{}: no such file or folder", path.string()),
-                 "check the path"};
-  }
-  if (::access(path.c_str(), R_OK) != 0)
-    return Error{Status::kFileUnreadable, fmt::format("{}: {}", path.string(), std::strerror(errno)),
-                 "check the file's permissions"};
+  if (!fs::exists(status) && is_glob(input)) return add_pattern(path, path.string());
+  if (const Outcome ok = check_readable(path); !ok) return ok.error();
   const fs::path relative = fs::path(input).lexically_normal();
   const bool keeps_folders = listed && relative.is_relative() && *relative.begin() != "..";
   list.meshes.push_back({path, keeps_folders ? relative : path.filename()});
@@ -135,6 +149,14 @@ Outcome Lister::add_list(std::string_view name) {
 }
 
 }  // namespace
+
+Outcome check_mesh_file(const fs::path& path) {
+  if (const Outcome ok = check_readable(path); !ok) return ok.error();
+  if (has_mesh_extension(path)) return Done{};
+  return Error{Status::kUnknownFormat,
+               fmt::format("{}: has no mesh extension ({})", path.string(), kMeshExtensionList),
+               "name a mesh file"};
+}
 
 Result<InputList> list_inputs(const std::vector<std::string>& inputs, bool recursive) {
   Lister lister(recursive);

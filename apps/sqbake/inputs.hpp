@@ -26,11 +26,14 @@ struct InputList {
 /// The extensions that bake::read_mesh knows, for people.
 extern const char* const kMeshExtensionList;
 
+/// Whether this is, by its name, a mesh, and a file that can be read. Errors: kFileMissing, kFileUnreadable,
+/// kUnknownFormat.
+Outcome check_mesh_file(const std::filesystem::path& path);
+
 /// What inputs stand for: a file, a folder (its meshes; with `recursive` those below it, too), a pattern with
 /// * ? [ ** (the meshes that match), `@LIST` (one input a line; `@-`: standard input) or `@@LIST` (paths in
-/// it are relative to the list). A file called like a pattern or a list is named with `./` in front. Looks at
-/// names only, but for the lists. Errors: kFileMissing (also a pattern that nothing matches),
-/// kFileUnreadable, kUnknownFormat (a folder without meshes), kBadOption (lists in lists).
+/// it are relative to the list). A file called like a pattern or a list is named with `./` in front. Opens
+/// no mesh. Errors: kFileMissing (also a pattern that nothing matches), kFileUnreadable (files and folders), kUnknownFormat (a folder without meshes), kBadOption (lists in lists).
 Result<InputList> list_inputs(const std::vector<std::string>& inputs, bool recursive);
 
 }  // namespace sqmap::apps

@@ -58,10 +58,9 @@ Outcome append_manifest(const JobRequest& request, ConfigFiles& config, std::vec
   if (!manifest) return manifest.error();
   for (const ManifestAsset& asset : manifest.value().assets) {
     const fs::path input = (request.manifest.parent_path() / asset.input).lexically_normal();
-    if (::access(input.c_str(), R_OK) != 0)
-      return Error{errno == ENOENT || errno == ENOTDIR ? Status::kFileMissing : Status::kFileUnreadable,
-                   fmt::format("{}: {}: {}", request.manifest.string(), input.string(), std::strerror(errno)),
-                   "check the path; it is relative to the manifest"};
+    if (const Outcome ok = check_mesh_file(input); !ok)
+      return Error{ok.error().status, fmt::format("{}: {}", request.manifest.string(), ok.error().finding),
+                   ok.error().remedy + "; paths are relative to the manifest"};
     const fs::path relative = asset.input.lexically_normal();
     const bool is_below = relative.is_relative() && *relative.begin() != "..";
     const fs::path place = is_below ? relative : relative.filename();
@@ -138,6 +137,27 @@ Outcome check_request(const JobRequest& request) {
   return Done{};
 }
 
+std::set<fs::path> output_folders(const JobList& list) {
+  std::set<fs::path> folders;
+  for (const Job& job : list.jobs) {
+    const fs::path folder = job.output.parent_path();
+    folders.insert(folder.empty() ? fs::path(".") : folder);
+  }
+  return folders;
+}
+
+Outcome check_folder(const fs::path& folder) {
+  std::error_code code;
+  if (!fs::is_directory(folder, code))
+    return Error{Status::kFileUnwritable,
+                 fmt::format("{}: {}", folder.string(), fs::exists(folder, code) ? "not a folder" : "no such folder"),
+                 "make the folder, or name another output"};
+  if (::access(folder.c_str(), W_OK | X_OK) != 0)
+    return Error{Status::kFileUnwritable, fmt::format("{}: {}", folder.string(), std::strerror(errno)),
+                 "check the folder's permissions"};
+  return Done{};
+}
+
 }  // namespace
 
 Result<JobList> list_jobs(const JobRequest& request) {
@@ -171,22 +191,25 @@ Result<JobList> list_jobs(const JobRequest& request) {
   return list;
 }
 
-Outcome prepare_folders(const JobList& list, const JobRequest& request) {
-  std::set<fs::path> folders;
-  for (const Job& job : list.jobs) {
-    const fs::path folder = job.output.parent_path();
-    folders.insert(folder.empty() ? fs::path(".") : folder);
+Outcome check_folders(const JobList& list, const JobRequest& request) {
+  std::error_code code;
+  for (const fs::path& folder : output_folders(list)) {
+    fs::path there = folder;  // itself, or what it will be made in
+    while (!request.out_dir.empty() && !fs::exists(there, code) && there.has_relative_path())
+      there = there.has_parent_path() ? there.parent_path() : ".";
+    if (const Outcome ok = check_folder(there); !ok) return ok.error();
   }
-  for (const fs::path& folder : folders) {
+  return Done{};
+}
+
+Outcome prepare_folders(const JobList& list, const JobRequest& request) {
+  for (const fs::path& folder : output_folders(list)) {
     std::error_code code;
     if (!request.out_dir.empty()) fs::create_directories(folder, code);
-    if (code || !fs::is_directory(folder, code))
-      return Error{Status::kFileUnwritable,
-                   fmt::format("{}: {}", folder.string(), code ? code.message() : "no such folder"),
+    if (code)
+      return Error{Status::kFileUnwritable, fmt::format("{}: {}", folder.string(), code.message()),
                    "make the folder, or name another output"};
-    if (::access(folder.c_str(), W_OK | X_OK) != 0)
-      return Error{Status::kFileUnwritable, fmt::format("{}: {}", folder.string(), std::strerror(errno)),
-                   "check the folder's permissions"};
+    if (const Outcome ok = check_folder(folder); !ok) return ok.error();
   }
   return Done{};
 }

@@ -40,11 +40,14 @@ struct JobList {
   bool single_file = false;  ///< one file was named: its error is the program's error
 };
 
-/// The jobs of a request. Reads lists and TOML files, but no mesh, and writes nothing.
-/// Errors: kBadOption (options that do not fit, two inputs for one output, a wrong setting), kFileMissing,
-/// kFileUnreadable, kUnknownFormat (a folder without meshes), kFileUnwritable (an output that is no bundle of
+/// The jobs of a request. Reads lists and TOML files, but of a mesh no more than whether it can be read, and
+/// writes nothing. Errors: kBadOption (options that do not fit, two inputs for one output, a wrong setting),
+/// kFileMissing, kFileUnreadable, kUnknownFormat (a folder without meshes, a manifest that names none), kFileUnwritable (an output that is no bundle of
 /// ours, without force).
 Result<JobList> list_jobs(const JobRequest& request);
+
+/// Whether prepare_folders() would succeed; makes nothing. Errors: kFileUnwritable.
+Outcome check_folders(const JobList& list, const JobRequest& request);
 
 /// Makes the output folders and checks that they can be written. Errors: kFileUnwritable.
 Outcome prepare_folders(const JobList& list, const JobRequest& request);

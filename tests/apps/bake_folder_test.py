@@ -2,6 +2,7 @@
 """Folders: one bad mesh does not stop the others, names are mirrored, records are complete, bytes repeat."""
 import json
 import os
+import subprocess
 import unittest
 
 from support import ROUGH, FolderTest, box, run, sphere, write_off
@@ -59,14 +60,42 @@ class Folder(FolderTest):
         self.assertEqual(result.stdout, "")
         self.assertEqual(result.stderr.count("\n"), 1)
 
-    def test_links_and_pipes_get_a_record_of_their_own(self):
+    def refuse(self, named, *arguments, **options):
+        for dry in ((), ("-n",)):
+            result = run("sqbake", "bake", *arguments, "--out-dir", self.out, *dry, **options)
+            self.assert_exit(result, 3)
+            self.assertIn(named, result.stderr)
+            self.assertEqual((result.stdout, result.stderr.count("\n")), ("", 1))
+            self.assertFalse(self.out.exists())
+
+    def test_links_to_nothing_and_pipes_are_found_before_the_first_bake(self):
         os.mkfifo(self.models / "pipe.off")
+        self.refuse("pipe.off: not a regular file", self.models)
+        self.refuse("pipe.off", f"{self.models}/*.off")
+        (self.models / "pipe.off").unlink()
         (self.models / "dangling.off").symlink_to("nowhere.off")
-        result = run("sqbake", "bake", self.models, *ROUGH, "--out-dir", self.out)
-        self.assert_exit(result, 1)
-        self.assertIn("pipe.off", result.stderr)
-        self.assertIn("dangling.off", result.stderr)
-        self.assertIn("2 of 5 baked, 3 failed", result.stderr)
+        self.refuse("dangling.off", self.models)
+
+    @unittest.skipUnless(os.getuid() == 0, "needs root, to become somebody else")
+    def test_what_may_not_be_read_is_found_before_the_first_bake(self):
+        locked = self.models / "deep" / "locked"
+        locked.mkdir()
+        write_off(locked / "c.off", box())
+        secret = write_off(self.models / "secret.obj", box())
+        self.folder.chmod(0o777)
+        locked.chmod(0)
+        nobody = {"user": 65534, "group": 65534, "extra_groups": ()}
+        try:
+            run("sqbake", "--version", **nobody).check_returncode()
+        except (OSError, subprocess.CalledProcessError) as problem:
+            self.skipTest(f"nobody may not start sqbake here: {problem}")
+        self.refuse(f"{locked}: Permission denied", self.models, "--recursive", **nobody)
+        self.refuse(f"{locked}: Permission denied", f"{self.models}/**/*.off", **nobody)
+        secret.chmod(0)
+        self.refuse(f"{secret}: Permission denied", self.models, **nobody)
+        locked.chmod(0o755)
+        secret.chmod(0o644)
+        self.assert_exit(run("sqbake", "bake", self.models, "--recursive", "--out-dir", self.out, "-n", **nobody), 0)
 
     def test_a_folder_without_meshes_is_refused(self):
         result = run("sqbake", "bake", self.models / "deep" / "..", self.out.parent / "none", "--out-dir", self.out)

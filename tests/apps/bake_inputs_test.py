@@ -75,10 +75,22 @@ class Inputs(FolderTest):
         self.refuse(2, ["props.toml:3", "../x.h5"], "--manifest", manifest)
         manifest.write_text('[[asset]]\ninput = "none.off"\n', encoding="ascii")
         self.refuse(3, ["props.toml", "none.off"], "--manifest", manifest)
+        for name, code, finding in (("deep", 3, "is a folder"), ("deep/notes.txt", 4, "mesh extension")):
+            manifest.write_text(f'[[asset]]\ninput = "a.off"\n[[asset]]\ninput = "{name}"\n', encoding="ascii")
+            for dry in ((), ("-n",)):
+                self.refuse(code, ["props.toml", name, finding], "--manifest", manifest, *dry)
 
     def test_two_meshes_for_one_bundle_are_refused_before_work(self):
         write_off(self.models / "deep" / "d.off", box())
         self.refuse(2, ["d.obj", "d.off"], self.models, "--recursive")
+
+    def test_a_dry_run_refuses_an_output_that_a_run_would(self):
+        source = self.models / "a.off"
+        for arguments in (("-o", self.folder / "none" / "x.h5"), ("-o", source / "x.h5"), ("--out-dir", source),
+                          ("--out-dir", source / "deeper")):
+            for dry in ((), ("-n",)):
+                with self.subTest(arguments=arguments, dry=dry):
+                    self.assert_exit(run("sqbake", "bake", source, *arguments, *dry), 3)
 
     def test_a_dry_run_writes_nothing_and_says_what_would_be(self):
         result = run("sqbake", "bake", self.models / "a.off", "-o", self.folder / "a.h5", "-n", "--max-parts", "3")
