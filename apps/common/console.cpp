@@ -64,6 +64,8 @@ void Console::warning(std::string_view message) {
   if (!quiet_) say("warning", kYellow, message);
 }
 
+void Console::insist(std::string_view message) { say("warning", kYellow, message); }
+
 void Console::note(std::string_view message) {
   if (!quiet_) say(nullptr, nullptr, message);
 }

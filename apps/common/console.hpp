@@ -32,6 +32,8 @@ class Console {
   /// `program: error: message` and its kin on stderr. Notes and warnings are silent after set_quiet.
   void error(std::string_view message);
   void warning(std::string_view message);
+  /// A warning that is not silent after set_quiet either: the result is less than was asked for.
+  void insist(std::string_view message);
   void note(std::string_view message);
 
   /// Replaces the status line. Only when stderr is a terminal; empty removes it.

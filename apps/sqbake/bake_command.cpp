@@ -177,7 +177,7 @@ void add_output_options(CLI::App& app, BakeArguments& arguments) {
                                                                       {"never", When::kNever}})
                       .description(""))
       ->type_name("WHEN");
-  CLI::Option* quiet = app.add_flag("-q,--quiet", arguments.quiet, "Errors only; no table");
+  CLI::Option* quiet = app.add_flag("-q,--quiet", arguments.quiet, "Only errors, and what is degraded; no table");
   app.add_flag("-v,--verbose", arguments.verbose, "Add the time of every stage to the table")
       ->excludes(quiet);
 }

@@ -235,7 +235,7 @@ void BakeRun::report(BakeRecord& record, const Job& job) {
   if (!arguments_.report.empty()) record_lines_ += record_line(record);
   for (const std::string& warning : record.warnings) console_.warning(job.name + ": " + warning);
   for (const Degradation& item : record.degradations)
-    console_.warning(fmt::format("{}: degraded: {}", job.name, item.finding));
+    console_.insist(fmt::format("{}: degraded: {}", job.name, item.finding));
   if (!record.has_bundle() && record.verdict != Verdict::kCancelled) {
     const bool is_plain = record.verdict == Verdict::kFailed;
     Error error = *record.error;

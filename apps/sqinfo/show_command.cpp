@@ -203,6 +203,10 @@ std::string text_report(const BundleFacts& facts) {
       mesh.is_closed ? "closed" : "open", mesh.volume_m3, mesh.welded_vertices, mesh.degenerate_faces,
       mesh.duplicate_faces, mesh.flipped_faces, mesh.filled_holes, mesh.boundary_edges,
       mesh.non_manifold_edges, origin.generator, origin.generator_version, origin.options_json);
+  if (const Json options = options_json(origin.options_json); options.contains("fallback"))
+    text += fmt::format(
+        "  degraded   fallback ({}): one for the whole mesh, which could not be baked as the options say\n",
+        options["fallback"].is_string() ? options["fallback"].get<std::string>() : options["fallback"].dump());
   if (facts.certainty)
     text += fmt::format(
         "  bounds     {} bytes in memory; of the superquadrics' volume {:.1f} % is surely outside, {:.1f} % "

@@ -241,11 +241,19 @@ class Degraded(FolderTest):
         self.assert_exit(run("sqbake", "bake", source, "--out-dir", self.folder / "out", *options, "--strict"), 10)
         self.assert_exit(run("sqbake", "bake", self.folder, "--out-dir", self.folder / "out", *options, "--strict"), 1)
 
+    def test_quiet_is_not_silent_about_it(self):
+        source = write_off(self.folder / "open.off", self.OPEN)
+        result = run("sqbake", "bake", source, "-o", self.folder / "open.h5", *ROUGH, "--repair", "none", "-q")
+        self.assert_exit(result, 0)
+        self.assertRegex(result.stderr, r"\Asqbake: warning: open\.off: degraded: [^\n]+\n\Z")
+        self.assertEqual(result.stdout, "")
+
     def test_a_closed_mesh_is_not(self):
         source = write_off(self.folder / "box.off", box())
         result = run("sqbake", "bake", source, *ROUGH, "-o", self.folder / "box.h5", "--format", "ndjson", "--strict")
         self.assert_exit(result, 0)
         self.assertEqual(records_of(result.stdout)[0]["outcome"], "ok")
+        self.assertNotIn("degraded", run("sqinfo", "show", self.folder / "box.h5").stdout)
 
     def test_the_fallback_is_marked_in_log_record_and_bundle_and_bounds_the_mesh(self):
         (vertices, faces), (box_vertices, box_faces) = bent(4, 1), box()
@@ -266,6 +274,7 @@ class Degraded(FolderTest):
         self.assertIn("degraded: one superquadric", stderr)
         shown = json.loads(run("sqinfo", "show", output, "--format", "json").stdout)
         self.assertEqual(shown["provenance"]["options"]["fallback"], "superquadric")
+        self.assertRegex(run("sqinfo", "show", output).stdout, r"(?m)^  degraded +fallback \(superquadric\)")
         self.assertTrue(shown["provenance"]["options"]["decompose"]["join_components"])
         points = "".join(f"{x!r},{y!r},{z!r}\n" for x, y, z in mesh[0])
         layer_1 = run("sqinfo", "query", output, "--points", "-", "--layer", "1", input=points)
