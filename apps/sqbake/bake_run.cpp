@@ -8,6 +8,9 @@
 #include <utility>
 
 #include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "sqmap/io/bundle.hpp"
 
 #include "../common/files.hpp"
 #include "depfile.hpp"
@@ -38,6 +41,14 @@ RecordWriter::Options writer_options(const BakeArguments& arguments, const JobLi
   std::size_t width = 0;
   for (const Job& job : list.jobs) width = std::max(width, job.name.size());
   return {arguments.format, arguments.quiet, arguments.verbose, list.single_file, width};
+}
+
+/// Whether a file is a sound bundle, and not one that a fallback left.
+bool holds_more_than_fallback(const std::filesystem::path& file) {
+  const Result<Asset> asset = io::read(file);
+  if (!asset) return false;
+  const auto options = nlohmann::json::parse(asset.value().provenance.options_json, nullptr, false);
+  return !options.contains("fallback");
 }
 
 BakeRecord cancelled(const char* finding) {
@@ -160,7 +171,7 @@ void BakeRun::run_here() {
   }
 }
 
-bool BakeRun::falls_back(std::size_t index, const BakeRecord& record) {
+bool BakeRun::falls_back(std::size_t index, BakeRecord& record) {
   Running& running = running_[index];
   const bool is_worth_it =
       record.verdict == Verdict::kTimeout || record.verdict == Verdict::kMemory ||
@@ -168,6 +179,11 @@ bool BakeRun::falls_back(std::size_t index, const BakeRecord& record) {
       (record.verdict == Verdict::kFailed && record.error->status == Status::kBakeFailed);
   if (!is_worth_it || running.is_fallback || is_stopping()) return false;
   if (list_.jobs[index].settings.at("fallback").text == "none") return false;
+  if (const std::filesystem::path& output = list_.jobs[index].output; holds_more_than_fallback(output)) {
+    record.warnings.push_back(
+        fmt::format("no fallback is baked: {} holds an earlier bundle that is none, and is kept", output.string()));
+    return false;
+  }
   running.cause = record;
   queue_.push_front({index, true});
   return true;

@@ -63,8 +63,9 @@ class BakeRun {
   void run_here();
   void start_workers(WorkerProcesses& workers);
   void on_finished(std::size_t index, BakeProduct product);
-  /// True: the plain bake takes its place in the queue.
-  bool falls_back(std::size_t index, const BakeRecord& record);
+  /// True: the plain bake takes its place in the queue. Not where a better bundle is there already, which the
+  /// record is told then.
+  bool falls_back(std::size_t index, BakeRecord& record);
   void publish(std::size_t index, BakeProduct product);
   void hand_in(std::size_t index, BakeRecord record);
   void report(BakeRecord& record, const Job& job);

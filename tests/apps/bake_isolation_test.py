@@ -281,6 +281,32 @@ class Degraded(FolderTest):
         self.assert_exit(layer_1, 0)
         self.assertEqual({line.split(",")[3] for line in layer_1.stdout.splitlines()[1:]}, {"1"})
 
+    def bake_killed(self, source, output):
+        """The record and the messages of a bake with a fallback whose first worker is killed."""
+        process = subprocess.Popen(
+            command("sqbake", "bake", source, "-o", output, "--fallback", "superquadric", "--format", "ndjson"),
+            stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        os.kill(until(lambda: children(process.pid))[0], signal.SIGKILL)
+        stdout, stderr = process.communicate(timeout=TIMEOUT_S)
+        return process.returncode, records_of(stdout)[0], stderr
+
+    def test_a_fallback_takes_the_place_of_another_and_of_no_better_bundle(self):
+        source = write_off(self.folder / "bent.off", bent(4, 1))
+        output = self.folder / "bent.h5"
+        output.write_bytes(self.bake(box(2, 2, 2), "earlier", *ROUGH).read_bytes())
+        earlier = output.read_bytes()
+        code, record, stderr = self.bake_killed(source, output)
+        self.assertEqual((code, record["outcome"]), (9, "crashed"), stderr)
+        self.assertIn("is kept", record["warnings"][0])
+        self.assertIn("is kept", stderr)
+        self.assertEqual(output.read_bytes(), earlier)
+        output.write_bytes(earlier[:len(earlier) // 2])  # a damaged one is no better
+        self.assertEqual(self.bake_killed(source, output)[1]["degradations"][0]["id"], "fallback")
+        write_off(source, bent(4, 2))
+        fallback = output.read_bytes()
+        self.assertEqual(self.bake_killed(source, output)[1]["outcome"], "degraded")
+        self.assertNotEqual(output.read_bytes(), fallback)
+
     def test_a_mesh_that_cannot_be_read_gets_no_fallback(self):
         source = self.folder / "bad.off"
         source.write_text("OFF\n1 1 0\n", encoding="ascii")
