@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cstdint>
 #include <exception>
 #include <new>
 #include <optional>
@@ -81,6 +82,10 @@ std::optional<Error> bake_into(BakeProduct& product, const BakeJob& job, const A
   for (bake::StageTime& time : result.value().times) record.times.push_back(std::move(time));
   record.describe(asset);
   record.stopped_by = result.value().stopped_by;
+  if (const std::uint32_t holes = asset.mesh.filled_holes; holes > 0)
+    record.warnings.push_back(fmt::format(
+        "{} hole{} in the mesh filled, where the surface is a guess; --repair safe leaves holes open", holes,
+        holes == 1 ? "" : "s"));
   if (!asset.mesh.is_closed)
     record.degradations.push_back(
         {"open-mesh",

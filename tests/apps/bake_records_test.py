@@ -55,6 +55,19 @@ class Records(FolderTest):
                 self.valid(line)
             self.valid(run("sqbake", "bake", self.models, *options, *dry, "--format", "json").stdout)
 
+    def test_filled_holes_are_told_in_log_record_and_page(self):
+        vertices, faces = sphere(1)
+        holed = write_off(self.models / "holed.off", (vertices, faces[1:-1]))  # opposite triangles are gone
+        options = (*ROUGH, "-o", self.folder / "a.h5", "--report", self.folder / "page.html", "--format", "ndjson")
+        result = run("sqbake", "bake", holed, *options)
+        self.assert_exit(result, 0)
+        record = self.valid(result.stdout.splitlines()[0])
+        self.assertEqual((record["outcome"], record["mesh"]["filled_holes"]), ("ok", 2))
+        self.assertRegex(record["warnings"][0], "^2 holes .* filled")
+        self.assertIn("warning: holed.off: 2 holes", result.stderr)
+        self.assertIn("2 holes", (self.folder / "page.html").read_text(encoding="utf-8"))
+        self.assertEqual(run("sqbake", "bake", self.models / "ball.off", *options).stderr, "")
+
     def test_the_schema_refuses_what_is_no_record(self):
         good = self.valid(run("sqbake", "bake", self.models / "ball.off", *ROUGH, "-o", self.folder / "a.h5", "--format",
                               "ndjson").stdout.splitlines()[0])
