@@ -3,14 +3,19 @@
 import csv
 import json
 import os
+import re
 import struct
+import subprocess
+import tempfile
 import unittest
 import xml.etree.ElementTree as ElementTree
 from pathlib import Path
 
-from support import ROUGH, FolderTest, run, sphere
+from support import BIN, ROUGH, TIMEOUT_S, FolderTest, run, sphere
 
-SCENES = Path(os.environ["SQMAP_SOURCE_DIR"]) / "samples" / "scenes"
+SOURCE = Path(os.environ["SQMAP_SOURCE_DIR"])
+MESHES = Path(os.environ["SQMAP_MESH_DIR"])
+SCENES = SOURCE / "samples" / "scenes"
 SCHEMA = json.loads((SCENES / "scene.schema.json").read_text(encoding="utf-8"))
 RADIUS_M = 0.5
 
@@ -91,6 +96,46 @@ class Simulation(FolderTest):
         mean = sum(row["force_z_n"] for row in rows[-240:]) / 240
         self.assertAlmostEqual(mean, 0.2 * 9.81, delta=0.1 * 0.2 * 9.81)
         self.assertGreater(rows[-1]["contacts"], 20)
+
+
+class ShippedScenes(unittest.TestCase):
+    """The scenes as README runs them, in a tree like that of a build, with rough bakes of the samples."""
+
+    @classmethod
+    def setUpClass(cls):
+        holder = tempfile.TemporaryDirectory(prefix="sqmap-")
+        cls.addClassCleanup(holder.cleanup)
+        cls.folder = Path(holder.name)
+        (cls.folder / "build").mkdir()
+        for link, target in [("samples", SOURCE / "samples"), ("build/bin", BIN), ("build/meshes", MESHES)]:
+            (cls.folder / link).symlink_to(target)
+        names = ("elephant", "camel", "hand", "lion", "dino", "armadillo")
+        result = run("sqbake", "bake", *(MESHES / f"{name}.off" for name in names), "--out-dir",
+                     cls.folder / "build" / "bundles", *ROUGH)
+        if result.returncode != 0:
+            raise AssertionError(result.stderr)
+
+    def rows(self, name, *options):
+        line = re.search(r"`(build/bin/sqsim samples/scenes/object_recognition[.]json [^`]*)`",
+                         (SOURCE / "README.md").read_text(encoding="utf-8"))[1]
+        words = line.replace("object_recognition", name).replace("DIR", "out").split() + ["--fast", *options]
+        result = subprocess.run(words, cwd=self.folder, stdin=subprocess.DEVNULL, capture_output=True, text=True,
+                                timeout=TIMEOUT_S, check=False)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertEqual(sorted(path.name for path in (self.folder / "out").iterdir()),
+                         ["last_frame.glb", "trace.csv", "trace.svg"])
+        with open(self.folder / "out" / "trace.csv", encoding="ascii", newline="") as file:
+            return [{key: float(value) for key, value in row.items()} for row in csv.DictReader(file)]
+
+    def test_readmes_line_lets_the_hand_touch(self):
+        rows = self.rows("object_recognition", "--seconds", "2.5", "--rate", "200")
+        self.assertEqual(len(rows), 500)
+        self.assertGreater(max(row["contacts"] for row in rows), 10)
+
+    def test_readmes_line_lets_the_cloth_touch(self):
+        rows = self.rows("costume_designer", "--seconds", "0.4")
+        self.assertEqual(len(rows), 48)
+        self.assertGreater(rows[-1]["contacts"], 10)
 
 
 class SceneFiles(FolderTest):
