@@ -206,7 +206,7 @@ std::string zsh_script(const CLI::App& program) {
       const std::string help =
           replaced(replaced(replaced(short_help(*option), "[", "("), "]", ")"), ":", "\\:");
       for (const std::string& each : names_of(*option)) {
-        std::string spec = each + "[" + help + "]";
+        std::string spec = fmt::format("{}[{}]", each, help);
         if (takes_value(*option))
           spec += fmt::format(":{}:{}", replaced(option->get_type_name(), ":", " "),
                               takes_path(*option) ? "_files" : "");
