@@ -111,13 +111,12 @@ class Records(FolderTest):
 
 
 class Terminal(FolderTest):
-    def test_a_terminal_sees_count_rate_and_time_left(self):
-        for name in "abcd":
-            write_off(self.folder / f"{name}.off", sphere(3))
+    def on_terminal(self, environment, *arguments):
+        """What a terminal sees of the messages."""
         master, slave = pty.openpty()
-        environment = {**{k: v for k, v in os.environ.items() if k not in ("CI", "NO_COLOR")}, "TERM": "xterm"}
-        process = subprocess.Popen(command("sqbake", "bake", self.folder, *ROUGH, "--out-dir", self.folder / "out", "-j1"),
-                                   stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=slave, env=environment)
+        plain = {k: v for k, v in os.environ.items() if k not in ("CI", "NO_COLOR", "TERM")}
+        process = subprocess.Popen(command(*arguments), stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=slave,
+                                   env={**plain, **environment})
         os.close(slave)
         shown = b""
         try:
@@ -126,9 +125,31 @@ class Terminal(FolderTest):
         except OSError:
             pass  # how a terminal ends
         os.close(master)
-        self.assertEqual(process.wait(timeout=TIMEOUT_S), 0)
-        self.assertRegex(shown.decode("utf-8"), r"\[2/4\] \w\.off  \w+ \d+ %  [\d.]+/(?:s|min)  \d+:\d\d:\d\d left")
-        last = re.split(r"\r\x1b\[K", shown.decode("utf-8"))[-1]
+        return process.wait(timeout=TIMEOUT_S), shown.decode("utf-8")
+
+    def test_messages_are_coloured_on_a_terminal_unless_the_environment_objects(self):
+        red = "\033[1;31merror:"
+        for environment, options, is_coloured in (({"TERM": "xterm"}, (), True),
+                                                  ({"TERM": "xterm", "NO_COLOR": "1"}, (), False),
+                                                  ({"TERM": "xterm", "NO_COLOR": ""}, (), True),
+                                                  ({"TERM": "dumb"}, (), False),
+                                                  ({"TERM": "xterm", "NO_COLOR": "1"}, ("--color", "always"), True),
+                                                  ({"TERM": "xterm"}, ("--color", "never"), False)):
+            with self.subTest(environment=environment, options=options):
+                code, shown = self.on_terminal(environment, "sqbake", "check", self.folder / "none.off", *options)
+                self.assertEqual(code, 3)
+                self.assertIn("error:", shown)
+                self.assertEqual(red in shown, is_coloured, repr(shown))
+                self.assertEqual("\033" in shown, is_coloured, repr(shown))
+
+    def test_a_terminal_sees_count_rate_and_time_left(self):
+        for name in "abcd":
+            write_off(self.folder / f"{name}.off", sphere(3))
+        code, shown = self.on_terminal({"TERM": "xterm"}, "sqbake", "bake", self.folder, *ROUGH, "--out-dir",
+                                       self.folder / "out", "-j1")
+        self.assertEqual(code, 0)
+        self.assertRegex(shown, r"\[2/4\] \w\.off  \w+ \d+ %  [\d.]+/(?:s|min)  \d+:\d\d:\d\d left")
+        last = re.split(r"\r\x1b\[K", shown)[-1]
         self.assertIn("4 of 4 baked", last)
 
 

@@ -182,5 +182,27 @@ class Cache(FolderTest):
         self.assert_exit(missing, 3)
 
 
+class LargeFolder(FolderTest):
+    def test_a_second_run_over_380_meshes_bakes_none_and_writes_nothing(self):
+        models, out = self.folder / "models", self.folder / "out"
+        source = write_off(self.folder / "ball.off", sphere(0))
+        for number in range(380):
+            (models / f"{number:03}").mkdir(parents=True)
+            (models / f"{number:03}" / "ball.off").write_bytes(source.read_bytes())
+        options = (*ROUGH, "--cache", self.folder / "cache", "--format", "ndjson")
+        first = run("sqbake", "bake", source, *options, "-o", self.folder / "ball.h5")
+        self.assertFalse(json.loads(first.stdout.splitlines()[0])["cached"])
+        times = []
+        for _ in range(2):
+            result = run("sqbake", "bake", models, "--recursive", *options, "--out-dir", out)
+            self.assert_exit(result, 0)
+            *assets, summary = map(json.loads, result.stdout.splitlines())
+            self.assertEqual((len(assets), summary["ok"], summary["cached"]), (380, 380, 380))
+            self.assertEqual([a["input"] for a in assets if not a["cached"]], [])
+            times.append({p: (p.stat().st_mtime_ns, p.stat().st_ino) for p in out.rglob("*.h5")})
+        self.assertEqual(len(times[0]), 380)
+        self.assertEqual(times[0], times[1])
+
+
 if __name__ == "__main__":
     unittest.main()
