@@ -13,17 +13,16 @@
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include "sqmap/asset/version.hpp"
 
+#include "choices.hpp"
 #include "shell_docs.hpp"
 #include "spelling.hpp"
 
 namespace sqmap::apps {
 namespace {
-
-const std::map<std::string, When> kWhenNames{
-    {"auto", When::kAuto}, {"always", When::kAlways}, {"never", When::kNever}};
 
 /// The first line of a text.
 std::string first_line(const std::string& text) { return text.substr(0, text.find('\n')); }
@@ -100,6 +99,27 @@ const char* unknown_command(const Program& program, int argc, char** argv) {
   return std::ranges::any_of(program.commands, is_named) ? nullptr : argv[1];
 }
 
+/// Of a command with commands of its own, none of which was named: the first word that could be meant for
+/// one, and which it probably was meant to be. Empty when there is no such word.
+std::string unknown_below(const CLI::App& app, int argc, char** argv) {
+  const std::vector<const CLI::App*> below = app.get_subcommands([](const CLI::App*) { return true; });
+  if (below.empty() || app.get_parent() == nullptr) return "";
+  for (int k = 2; k < argc; ++k) {
+    const std::string word(argv[k]);
+    if (word.starts_with('-')) {
+      const CLI::Option* option = app.get_option_no_throw(word);
+      if (option != nullptr && option->get_items_expected_max() > 0) ++k;  // its value
+      continue;
+    }
+    std::vector<std::string> names;
+    for (const CLI::App* each : below) names.push_back(each->get_name());
+    const std::string guess = did_you_mean(word, names);
+    return fmt::format("unknown command `{} {}`{}", app.get_name(), word,
+                       guess.empty() ? fmt::format("; the commands are {}", fmt::join(names, ", ")) : guess);
+  }
+  return "";
+}
+
 std::string one_line(std::string text) {
   std::replace(text.begin(), text.end(), '\n', ' ');
   while (!text.empty() && text.back() == ' ') text.pop_back();
@@ -126,9 +146,9 @@ Exit parse_and_run(const Program& program, Console& console, int argc, char** ar
   for (const Command& command : program.commands) {
     CLI::App* sub = app.add_subcommand(command.name, command.summary);
     runners.emplace_back(sub, command.declare(*sub));
-    sub->add_option("--color", color,
-                    "Colour messages: auto, always, never (default auto; NO_COLOR is honoured)")
-        ->transform(CLI::CheckedTransformer(kWhenNames).description(""))
+    add_choice<When>(*sub, "--color", color,
+                     {{"auto", When::kAuto}, {"always", When::kAlways}, {"never", When::kNever}},
+                     "Colour messages: auto, always, never (default auto; NO_COLOR is honoured)")
         ->type_name("WHEN");
     sub->footer(exit_code_table());
     for (CLI::Option* option : sub->get_options())
@@ -151,6 +171,10 @@ Exit parse_and_run(const Program& program, Console& console, int argc, char** ar
     console.out(std::string(version.what()) + "\n");
     return Exit::kOk;
   } catch (const CLI::ParseError& problem) {
+    if (const std::string unknown = unknown_below(deepest(app), argc, argv); !unknown.empty()) {
+      console.error(unknown);
+      return Exit::kUsage;
+    }
     const bool is_extra = problem.get_exit_code() == static_cast<int>(CLI::ExitCodes::ExtrasError);
     std::string names;
     for (const CLI::App* at = &deepest(app); at != nullptr; at = at->get_parent())

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 namespace sqmap::apps {
 namespace {
@@ -49,6 +50,10 @@ std::string nearest_name(std::string_view text, std::span<const std::string> nam
 std::string did_you_mean(std::string_view text, std::span<const std::string> names) {
   const std::string name = nearest_name(text, names);
   return name.empty() ? "" : fmt::format("; did you mean `{}`?", name);
+}
+
+std::string none_of(std::string_view text, std::span<const std::string> names) {
+  return fmt::format("`{}`, must be one of {}{}", text, fmt::join(names, ", "), did_you_mean(text, names));
 }
 
 }  // namespace sqmap::apps

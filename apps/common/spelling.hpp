@@ -14,4 +14,7 @@ std::string nearest_name(std::string_view text, std::span<const std::string> nam
 /// "; did you mean `NAME`?", or nothing.
 std::string did_you_mean(std::string_view text, std::span<const std::string> names);
 
+/// "`TEXT`, must be one of NAME, NAME", with the suggestion where one is near.
+std::string none_of(std::string_view text, std::span<const std::string> names);
+
 }  // namespace sqmap::apps

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <filesystem>
-#include <map>
 #include <memory>
 #include <string>
 #include <string_view>
@@ -10,6 +9,7 @@
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
+#include "../common/choices.hpp"
 #include "../common/files.hpp"
 #include "bake_run.hpp"
 #include "commands.hpp"
@@ -163,21 +163,17 @@ void add_run_options(CLI::App& app, BakeArguments& arguments) {
 }
 
 void add_output_options(CLI::App& app, BakeArguments& arguments) {
-  app.add_option("--format", arguments.format, "Results on stdout: text, json, ndjson (default text)")
-      ->transform(
-          CLI::CheckedTransformer(std::map<std::string, RecordFormat>{{"text", RecordFormat::kText},
-                                                                      {"json", RecordFormat::kJson},
-                                                                      {"ndjson", RecordFormat::kNdjson}})
-              .description(""))
+  add_choice<RecordFormat>(
+      app, "--format", arguments.format,
+      {{"text", RecordFormat::kText}, {"json", RecordFormat::kJson}, {"ndjson", RecordFormat::kNdjson}},
+      "Results on stdout: text, json, ndjson (default text)")
       ->type_name("FORMAT");
-  app.add_option("--progress", arguments.progress,
-                 "auto: a line on a terminal; always: also one line a stage in logs; never (default auto)")
-      ->transform(CLI::CheckedTransformer(std::map<std::string, When>{{"auto", When::kAuto},
-                                                                      {"always", When::kAlways},
-                                                                      {"never", When::kNever}})
-                      .description(""))
+  add_choice<When>(app, "--progress", arguments.progress,
+                   {{"auto", When::kAuto}, {"always", When::kAlways}, {"never", When::kNever}},
+                   "auto: a line on a terminal; always: also one line a stage in logs; never (default auto)")
       ->type_name("WHEN");
-  CLI::Option* quiet = app.add_flag("-q,--quiet", arguments.quiet, "Only errors, and what is degraded; no table");
+  CLI::Option* quiet =
+      app.add_flag("-q,--quiet", arguments.quiet, "Only errors, and what is degraded; no table");
   app.add_flag("-v,--verbose", arguments.verbose, "Add the time of every stage to the table")
       ->excludes(quiet);
 }

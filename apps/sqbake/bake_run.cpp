@@ -180,8 +180,8 @@ bool BakeRun::falls_back(std::size_t index, BakeRecord& record) {
   if (!is_worth_it || running.is_fallback || is_stopping()) return false;
   if (list_.jobs[index].settings.at("fallback").text == "none") return false;
   if (const std::filesystem::path& output = list_.jobs[index].output; holds_more_than_fallback(output)) {
-    record.warnings.push_back(
-        fmt::format("no fallback is baked: {} holds an earlier bundle that is none, and is kept", output.string()));
+    record.warnings.push_back(fmt::format(
+        "no fallback is baked: {} holds an earlier bundle that is none, and is kept", output.string()));
     return false;
   }
   running.cause = record;

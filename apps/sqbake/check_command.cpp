@@ -11,6 +11,7 @@
 
 #include "sqmap/bake/mesh.hpp"
 
+#include "../common/choices.hpp"
 #include "../common/json_text.hpp"
 #include "commands.hpp"
 #include "mesh_size.hpp"
@@ -95,8 +96,7 @@ std::function<Exit(Console&)> declare_check(CLI::App& app) {
   app.add_option("INPUT", args->input, "Mesh file")->required();
   constexpr std::array<std::string_view, 3> kMeshSettings{"unit", "up", "repair"};
   add_setting_options(app, kMeshSettings, args->settings);
-  app.add_option("--format", args->format, "text or json (default text)")
-      ->check(CLI::IsMember({"text", "json"}).description(""))
+  add_words(app, "--format", args->format, {"text", "json"}, "text or json (default text)")
       ->type_name("FORMAT");
   return [args](Console& console) { return run_check(console, *args); };
 }

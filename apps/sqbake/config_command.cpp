@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "../common/choices.hpp"
 #include "../common/json_text.hpp"
 #include "commands.hpp"
 #include "config_files.hpp"
@@ -93,8 +94,7 @@ std::function<Exit(Console&)> declare_config(CLI::App& app) {
   show->add_option("--manifest", args->manifest, "As of `sqbake bake`")->type_name("FILE.toml");
   show->add_option("--config", args->request.project, "As of `sqbake bake`")->type_name("FILE.toml");
   show->add_flag("!--no-config", args->request.use_files, "As of `sqbake bake`");
-  show->add_option("--format", args->format, "text or json, one line a mesh (default text)")
-      ->check(CLI::IsMember({"text", "json"}).description(""))
+  add_words(*show, "--format", args->format, {"text", "json"}, "text or json, one line a mesh (default text)")
       ->type_name("FORMAT");
   add_all_setting_options(*show, args->request.command_line);
   return [args](Console& console) { return run_show(console, *args); };

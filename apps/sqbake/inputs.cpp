@@ -49,9 +49,10 @@ Outcome check_readable(const fs::path& path) {
                  "check the path"};
   const bool is_known = fs::status_known(status);
   if (is_known && !fs::is_regular_file(status))
-    return Error{Status::kFileUnreadable,
-                 fmt::format("{}: {}", path.string(), fs::is_directory(status) ? "is a folder" : "not a regular file"),
-                 "name a mesh file"};
+    return Error{
+        Status::kFileUnreadable,
+        fmt::format("{}: {}", path.string(), fs::is_directory(status) ? "is a folder" : "not a regular file"),
+        "name a mesh file"};
   if (!is_known || ::access(path.c_str(), R_OK) != 0)
     return Error{Status::kFileUnreadable,
                  fmt::format("{}: {}", path.string(), is_known ? std::strerror(errno) : code.message()),

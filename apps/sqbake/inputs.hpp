@@ -33,7 +33,8 @@ Outcome check_mesh_file(const std::filesystem::path& path);
 /// What inputs stand for: a file, a folder (its meshes; with `recursive` those below it, too), a pattern with
 /// * ? [ ** (the meshes that match), `@LIST` (one input a line; `@-`: standard input) or `@@LIST` (paths in
 /// it are relative to the list). A file called like a pattern or a list is named with `./` in front. Opens
-/// no mesh. Errors: kFileMissing (also a pattern that nothing matches), kFileUnreadable (files and folders), kUnknownFormat (a folder without meshes), kBadOption (lists in lists).
+/// no mesh. Errors: kFileMissing (also a pattern that nothing matches), kFileUnreadable (files and folders),
+/// kUnknownFormat (a folder without meshes), kBadOption (lists in lists).
 Result<InputList> list_inputs(const std::vector<std::string>& inputs, bool recursive);
 
 }  // namespace sqmap::apps

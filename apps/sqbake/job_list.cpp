@@ -149,9 +149,10 @@ std::set<fs::path> output_folders(const JobList& list) {
 Outcome check_folder(const fs::path& folder) {
   std::error_code code;
   if (!fs::is_directory(folder, code))
-    return Error{Status::kFileUnwritable,
-                 fmt::format("{}: {}", folder.string(), fs::exists(folder, code) ? "not a folder" : "no such folder"),
-                 "make the folder, or name another output"};
+    return Error{
+        Status::kFileUnwritable,
+        fmt::format("{}: {}", folder.string(), fs::exists(folder, code) ? "not a folder" : "no such folder"),
+        "make the folder, or name another output"};
   if (::access(folder.c_str(), W_OK | X_OK) != 0)
     return Error{Status::kFileUnwritable, fmt::format("{}: {}", folder.string(), std::strerror(errno)),
                  "check the folder's permissions"};

@@ -42,8 +42,8 @@ struct JobList {
 
 /// The jobs of a request. Reads lists and TOML files, but of a mesh no more than whether it can be read, and
 /// writes nothing. Errors: kBadOption (options that do not fit, two inputs for one output, a wrong setting),
-/// kFileMissing, kFileUnreadable, kUnknownFormat (a folder without meshes, a manifest that names none), kFileUnwritable (an output that is no bundle of
-/// ours, without force).
+/// kFileMissing, kFileUnreadable, kUnknownFormat (a folder without meshes, a manifest that names none),
+/// kFileUnwritable (an output that is no bundle of ours, without force).
 Result<JobList> list_jobs(const JobRequest& request);
 
 /// Whether prepare_folders() would succeed; makes nothing. Errors: kFileUnwritable.

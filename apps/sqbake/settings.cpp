@@ -5,10 +5,12 @@
 #include <array>
 #include <charconv>
 #include <utility>
+#include <vector>
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
+#include "../common/spelling.hpp"
 #include "quantities.hpp"
 
 namespace sqmap::apps {
@@ -34,15 +36,15 @@ constexpr std::array<std::pair<std::string_view, Fallback>, 2> kFallbackNames{
 
 template <class Value>
 Outcome choose(std::string_view text, Names<Value> names, Value& value) {
-  std::string list;
+  std::vector<std::string> words;
   for (const auto& [name, named] : names) {
     if (name == text) {
       value = named;
       return Done{};
     }
-    list += (list.empty() ? "" : ", ") + std::string(name);
+    words.emplace_back(name);
   }
-  return Error{Status::kBadOption, fmt::format("`{}`, must be one of {}", text, list), ""};
+  return Error{Status::kBadOption, none_of(text, words), ""};
 }
 
 template <class Value>

@@ -11,6 +11,7 @@
 
 #include "sqmap/io/bundle.hpp"
 
+#include "../common/choices.hpp"
 #include "../common/json_text.hpp"
 #include "asset_diff.hpp"
 #include "commands.hpp"
@@ -77,8 +78,7 @@ std::function<Exit(Console&)> declare_diff(CLI::App& app) {
       ->type_name("T");
   app.add_flag("--ignore-provenance", args->ignore_provenance,
                "Leave out program, version, options, and name and hash of the source");
-  app.add_option("--format", args->format, "text or json (default text)")
-      ->check(CLI::IsMember({"text", "json"}).description(""))
+  add_words(app, "--format", args->format, {"text", "json"}, "text or json (default text)")
       ->type_name("FORMAT");
   return [args](Console& console) { return run_diff(console, *args); };
 }

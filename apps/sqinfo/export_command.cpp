@@ -14,6 +14,7 @@
 
 #include "sqmap/io/bundle.hpp"
 
+#include "../common/choices.hpp"
 #include "../common/files.hpp"
 #include "../common/glb_writer.hpp"
 #include "../common/json_text.hpp"
@@ -177,9 +178,8 @@ std::function<Exit(Console&)> declare_export(CLI::App& app) {
       ->type_name("MESH")
       ->needs(glb);
   CLI::Option* seg = app.add_option("--seg", args->seg, "Segmentation to write")->type_name("FILE.seg");
-  app.add_option("--level", args->labels,
-                 "What a label of --seg numbers: segments (natural parts) or parts (default parts)")
-      ->check(CLI::IsMember({"parts", "segments"}).description(""))
+  add_words(app, "--level", args->labels, {"parts", "segments"},
+            "What a label of --seg numbers: segments (natural parts) or parts (default parts)")
       ->type_name("LEVEL")
       ->needs(seg);
   app.add_option("--maps", args->maps, "Folder for the pictures")->type_name("DIR");

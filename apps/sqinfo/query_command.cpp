@@ -2,7 +2,6 @@
 #include <cmath>
 #include <cstdint>
 #include <filesystem>
-#include <map>
 #include <memory>
 #include <string>
 #include <string_view>
@@ -14,6 +13,7 @@
 #include "sqmap/io/bundle.hpp"
 #include "sqmap/runtime/object.hpp"
 
+#include "../common/choices.hpp"
 #include "../common/files.hpp"
 #include "commands.hpp"
 #include "points_csv.hpp"
@@ -113,14 +113,10 @@ std::function<Exit(Console&)> declare_query(CLI::App& app) {
   app.add_option("--points", args->points, "CSV file of points, or - for standard input")
       ->required()
       ->type_name("FILE");
-  app.add_option("--layer", args->options.layer,
-                 "1: superquadrics only; 2: distance map; 3: closest point; auto: 2 or 3 by resolution "
-                 "(default auto)")
-      ->transform(CLI::CheckedTransformer(std::map<std::string, Layer>{{"auto", Layer::kAuto},
-                                                                       {"1", Layer::kOne},
-                                                                       {"2", Layer::kTwo},
-                                                                       {"3", Layer::kThree}})
-                      .description(""))
+  add_choice<Layer>(
+      app, "--layer", args->options.layer,
+      {{"auto", Layer::kAuto}, {"1", Layer::kOne}, {"2", Layer::kTwo}, {"3", Layer::kThree}},
+      "1: superquadrics only; 2: distance map; 3: closest point; auto: 2 or 3 by resolution (default auto)")
       ->type_name("LAYER");
   app.add_option("--level", args->options.level, "Level of the maps, 0 the finest (default 0)")
       ->check(CLI::Range(0, 31).description(""))

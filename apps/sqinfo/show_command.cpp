@@ -16,6 +16,7 @@
 #include "sqmap/io/bundle.hpp"
 #include "sqmap/runtime/object.hpp"
 
+#include "../common/choices.hpp"
 #include "../common/files.hpp"
 #include "../common/json_text.hpp"
 #include "certainty_share.hpp"
@@ -206,7 +207,8 @@ std::string text_report(const BundleFacts& facts) {
   if (const Json options = options_json(origin.options_json); options.contains("fallback"))
     text += fmt::format(
         "  degraded   fallback ({}): one for the whole mesh, which could not be baked as the options say\n",
-        options["fallback"].is_string() ? options["fallback"].get<std::string>() : options["fallback"].dump());
+        options["fallback"].is_string() ? options["fallback"].get<std::string>()
+                                        : options["fallback"].dump());
   if (facts.certainty)
     text += fmt::format(
         "  bounds     {} bytes in memory; of the superquadrics' volume {:.1f} % is surely outside, {:.1f} % "
@@ -251,8 +253,7 @@ std::function<Exit(Console&)> declare_show(CLI::App& app) {
       "  sqinfo show hand.h5\n"
       "  sqinfo show hand.h5 --format json\n");
   app.add_option("BUNDLE", args->bundle, "Bundle file")->required();
-  app.add_option("--format", args->format, "text or json (default text)")
-      ->check(CLI::IsMember({"text", "json"}).description(""))
+  add_words(app, "--format", args->format, {"text", "json"}, "text or json (default text)")
       ->type_name("FORMAT");
   return [args](Console& console) { return run_show(console, *args); };
 }

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <filesystem>
-#include <map>
 #include <memory>
 #include <string>
 #include <vector>
@@ -12,6 +11,7 @@
 #include "sqmap/asset/validate.hpp"
 #include "sqmap/io/bundle.hpp"
 
+#include "../common/choices.hpp"
 #include "../common/json_text.hpp"
 #include "commands.hpp"
 
@@ -65,14 +65,11 @@ std::function<Exit(Console&)> declare_validate(CLI::App& app) {
       "  sqinfo validate hand.h5\n"
       "  sqinfo validate hand.h5 --level quick --format json\n");
   app.add_option("BUNDLE", args->bundle, "Bundle file")->required();
-  app.add_option("--level", args->level,
-                 "quick: what a reader must trust; full: also orders, codes and bounds (default full)")
-      ->transform(CLI::CheckedTransformer(std::map<std::string, CheckLevel>{{"quick", CheckLevel::kQuick},
-                                                                            {"full", CheckLevel::kFull}})
-                      .description(""))
+  add_choice<CheckLevel>(
+      app, "--level", args->level, {{"quick", CheckLevel::kQuick}, {"full", CheckLevel::kFull}},
+      "quick: what a reader must trust; full: also orders, codes and bounds (default full)")
       ->type_name("LEVEL");
-  app.add_option("--format", args->format, "text or json (default text)")
-      ->check(CLI::IsMember({"text", "json"}).description(""))
+  add_words(app, "--format", args->format, {"text", "json"}, "text or json (default text)")
       ->type_name("FORMAT");
   return [args](Console& console) { return run_validate(console, *args); };
 }

@@ -236,6 +236,35 @@ class Spelling(unittest.TestCase):
                 self.assertIn(f"did you mean {meant}?", result.stderr)
         self.assertNotIn("did you mean", run("sqbake", "bake", "x.off", "--colourful-fireworks").stderr)
 
+    def refuse(self, arguments, message):
+        with self.subTest(arguments=arguments):
+            result = run("sqbake", *arguments)
+            self.assertEqual((result.returncode, result.stdout), (2, ""))
+            self.assertIn(message, result.stderr)
+            self.assertEqual(result.stderr.count("\n"), 1)
+
+    def test_a_mistyped_command_of_a_command_is_answered_with_the_right_one(self):
+        self.refuse(("cache", "stat"), "unknown command `cache stat`; did you mean `stats`?")
+        self.refuse(("cache", "--format", "json", "verfiy"), "unknown command `cache verfiy`; did you mean `verify`?")
+        self.refuse(("config", "shw", "x.off"), "unknown command `config shw`; did you mean `show`?")
+        self.refuse(("cache", "fireworks"), "the commands are stats, verify, gc")
+        self.refuse(("cache",), "see `sqbake cache --help`")
+
+    def test_a_value_is_one_of_the_words_and_nothing_else(self):
+        formats = "must be one of text, json, ndjson"
+        for arguments, message in ((("bake", "x.off", "--format", "yaml"), f"--format: `yaml`, {formats}"),
+                                   (("bake", "x.off", "--format", "1"), f"--format: `1`, {formats}"),
+                                   (("bake", "x.off", "--format", "jsn"), "did you mean `json`?"),
+                                   (("bake", "x.off", "--progress", "2"), "must be one of auto, always, never"),
+                                   (("bake", "x.off", "--color", "blue"), "--color: `blue`, must be one of auto, always"),
+                                   (("check", "x.off", "--color", "1"), "must be one of auto, always, never"),
+                                   (("check", "x.off", "--format", "yaml"), "`yaml`, must be one of text, json"),
+                                   (("config", "show", "x.off", "--format", "yaml"), "must be one of text, json"),
+                                   (("cache", "stats", "--format", "yaml"), "must be one of text, json"),
+                                   (("plan", "x.off", "--out-dir", "o", "--format", "json"), "must be one of text, ndjson"),
+                                   (("bake", "x.off", "--quality", "drft"), "did you mean `draft`?")):
+            self.refuse(arguments, message)
+
 
 if __name__ == "__main__":
     unittest.main()

@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "../../common/choices.hpp"
 #include "../../common/json_text.hpp"
 #include "../commands.hpp"
 #include "../quantities.hpp"
@@ -150,8 +151,7 @@ std::function<Exit(Console&)> declare_cache(CLI::App& app) {
   app.add_option("--cache", args->folder,
                  "Folder (default: SQMAP_CACHE_DIR, else sqmap in XDG_CACHE_HOME,\nelse ~/.cache/sqmap)")
       ->type_name("DIR");
-  app.add_option("--format", args->format, "text or json (default text)")
-      ->check(CLI::IsMember({"text", "json"}).description(""))
+  add_words(app, "--format", args->format, {"text", "json"}, "text or json (default text)")
       ->type_name("FORMAT");
   CLI::App* stats = app.add_subcommand("stats", "How much is in it")->fallthrough();
   CLI::App* verify =

@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "../../common/choices.hpp"
 #include "../../common/json_text.hpp"
 #include "../commands.hpp"
 #include "../job_list.hpp"
@@ -101,8 +102,8 @@ std::function<Exit(Console&)> declare_plan(CLI::App& app) {
   app.add_option("--shard", args->shard, "Only one of N; auto: as the job array of Slurm or Kubernetes says")
       ->excludes(shards)
       ->type_name("I/N");
-  app.add_option("--format", args->format, "text or ndjson, one line a mesh (default text)")
-      ->check(CLI::IsMember({"text", "ndjson"}).description(""))
+  add_words(app, "--format", args->format, {"text", "ndjson"},
+            "text or ndjson, one line a mesh (default text)")
       ->type_name("FORMAT");
   return [args](Console& console) { return run_plan(console, *args); };
 }
