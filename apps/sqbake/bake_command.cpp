@@ -48,6 +48,21 @@ Outcome check_side_outputs(const BakeArguments& arguments, const JobList& list) 
   return check_depfile(depfile, arguments.request.force, bundles);
 }
 
+/// Limits are kept by ending a worker, and there is none without isolation.
+Outcome check_limits(const BakeArguments& arguments) {
+  if (!arguments.no_isolation) return Done{};
+  for (const char* limit : {"timeout", "memory"}) {
+    const auto given = arguments.request.config.command_line.find(limit);
+    if (given != arguments.request.config.command_line.end() && given->second != "none")
+      return Error{
+          Status::kBadOption,
+          fmt::format("--no-isolation and --{} exclude each other: a limit ends a worker, and there is none",
+                      limit),
+          "leave one of them out"};
+  }
+  return Done{};
+}
+
 Outcome write_run_report(const BakeArguments& arguments, std::string_view record_lines) {
   const Result<AssetRecords> records = parse_asset_records(record_lines, "records");
   if (!records) return records.error();
@@ -68,6 +83,7 @@ Exit run_bake(Console& console, const BakeArguments& arguments) {
   };
   console.set_quiet(arguments.quiet);
   if (const auto ok = options_from(arguments.request.config.command_line); !ok) return refuse(ok.error());
+  if (const Outcome ok = check_limits(arguments); !ok) return refuse(ok.error());
   Result<JobList> list = list_jobs(arguments.request);
   if (!list) return refuse(list.error());
   if (!arguments.shard.empty()) {

@@ -43,6 +43,17 @@ RecordWriter::Options writer_options(const BakeArguments& arguments, const JobLi
   return {arguments.format, arguments.quiet, arguments.verbose, list.single_file, width};
 }
 
+/// Says of a limit that was run into where it was given: that is where to raise it.
+void name_the_limit(BakeRecord& record, const Job& job) {
+  const char* setting = record.verdict == Verdict::kTimeout  ? "timeout"
+                        : record.verdict == Verdict::kMemory ? "memory"
+                                                             : nullptr;
+  if (setting == nullptr || !record.error) return;
+  const SettingValue& value = job.settings.find(setting)->second;
+  if (value.text != "none")
+    record.error->finding += fmt::format(" ({} {}, {})", setting, value.text, value.source);
+}
+
 /// Whether a file is a sound bundle, and not one that a fallback left.
 bool holds_more_than_fallback(const std::filesystem::path& file) {
   const Result<Asset> asset = io::read(file);
@@ -88,7 +99,8 @@ void BakeRun::take_from_cache() {
     if (stop_signal() != 0) return;
     CacheAnswer answer = cache_->lookup(cache_request(job));
     if (arguments_.explain)
-      for (const std::string& reason : answer.reasons) console_.note(job.name + ": " + reason);
+      for (const std::string& reason : answer.reasons)
+        console_.note(job.name + ": " + with_setting_names(reason));
     Result<BakeRecord> record = Error{Status::kBadOption, "", ""};
     if (answer.is_hit) record = parse_record(answer.record_json);
     if (!record) {
@@ -190,6 +202,7 @@ bool BakeRun::falls_back(std::size_t index, BakeRecord& record) {
 }
 
 void BakeRun::on_finished(std::size_t index, BakeProduct product) {
+  name_the_limit(product.record, list_.jobs[index]);
   if (falls_back(index, product.record)) return;
   BakeRecord& record = product.record;
   if (const auto cause = std::exchange(running_[index].cause, std::nullopt)) {

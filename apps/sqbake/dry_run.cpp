@@ -29,6 +29,7 @@ struct Forecast {
 Forecast forecast(const std::optional<BundleCache>& cache, const Job& job) {
   if (!cache) return {false, {kNoCache}};
   CacheAnswer answer = cache->peek(cache_request(job));
+  for (std::string& reason : answer.reasons) reason = with_setting_names(std::move(reason));
   return {answer.is_hit && parse_record(answer.record_json), std::move(answer.reasons)};
 }
 

@@ -84,6 +84,13 @@ Outcome check_clashes(const std::vector<Job>& jobs) {
     if (is_new_folder)
       folder->second = fs::weakly_canonical(fs::absolute(job.output, code).parent_path(), code);
     const auto [entry, is_new] = owner.emplace(folder->second / job.output.filename(), &job);
+    if (!is_new && fs::equivalent(entry->second->input, job.input, code))
+      return Error{
+          Status::kBadOption,
+          fmt::format(
+              "{} is named twice, for one bundle{}", entry->second->input.string(),
+              entry->second->input == job.input ? "" : fmt::format(": also as {}", job.input.string())),
+          "name it once"};
     if (!is_new)
       return Error{Status::kBadOption,
                    fmt::format("{} and {} would both be written to {}", entry->second->input.string(),

@@ -219,8 +219,25 @@ Result<AssetOptions> options_from(const SettingTexts& texts) {
     if (const Outcome ok = setting.apply(options, given->second); !ok)
       return Error{Status::kBadOption, fmt::format("{}: {}", setting.name, ok.error().finding), ""};
   }
-  if (const Outcome ok = options.bake.check(); !ok) return ok.error();
+  if (const Outcome ok = options.bake.check(); !ok)
+    return Error{ok.error().status, with_setting_names(ok.error().finding), ok.error().remedy};
   return options;
+}
+
+std::string with_setting_names(std::string text) {
+  // Options of the library, as its messages and its JSON call them, and the settings they come from.
+  constexpr std::array<std::pair<std::string_view, std::string_view>, 7> kNames{
+      {{"max_error_percent", "max-error (percent)"},
+       {"max_error_m", "max-error (metres)"},
+       {"max_parts", "max-parts"},
+       {"max_bytes", "max-bytes"},
+       {"read.metres_per_unit", "unit (metres)"},
+       {"read.up", "up"},
+       {"repair.policy", "repair"}}};
+  for (const auto& [option, setting] : kNames)
+    if (const std::size_t at = text.find(option); at != std::string::npos)
+      return text.replace(at, option.size(), fmt::format("--{}", setting));
+  return text;
 }
 
 void add_setting_options(CLI::App& app, std::span<const std::string_view> names, SettingTexts& texts) {

@@ -61,6 +61,10 @@ SettingTexts limits_of(std::string_view quality);
 /// Limits that are given hold, whatever the quality. Errors: kBadOption with the setting and what it must be.
 Result<AssetOptions> options_from(const SettingTexts& texts);
 
+/// A message of libbake, or a difference of two sets of its options, with the first option that it names
+/// replaced by that of the command line: `max_parts = 0` becomes `--max-parts = 0`.
+std::string with_setting_names(std::string text);
+
 /// Adds `--NAME` for each named setting. A text that cannot be right is refused while parsing. `texts` must
 /// outlive the parsing.
 void add_setting_options(CLI::App& app, std::span<const std::string_view> names, SettingTexts& texts);

@@ -84,6 +84,26 @@ class Inputs(FolderTest):
         write_off(self.models / "deep" / "d.off", box())
         self.refuse(2, ["d.obj", "d.off"], self.models, "--recursive")
 
+    def test_a_mesh_that_is_named_twice_is_told_as_that(self):
+        (self.models / "link").symlink_to("deep")
+        for arguments, named in ((("a.off", "./a.off"), "also as ./a.off; name it once"),
+                                 (("deep/b.off", "deep/b.off"), "deep/b.off is named twice, for one bundle; name it"),
+                                 (("deep/b.off", "link/b.off"), "also as link/b.off; name it once")):
+            self.refuse(2, named, *arguments, cwd=self.models)
+
+    def test_limits_need_isolation(self):
+        for limit in (("--timeout", "5s"), ("--memory", "1G")):
+            self.refuse(2, ["--no-isolation", limit[0]], self.models / "a.off", "--no-isolation", *limit)
+        for free in ((), ("--timeout", "none")):
+            self.plan(self.models / "a.off", "--no-isolation", *free)
+
+    def test_errors_name_the_option_as_it_is_spelt(self):
+        for option, value in (("--max-parts", "0"), ("--max-error", "101%"), ("--max-error", "1000000000000000m"),
+                              ("--max-bytes", "12")):
+            with self.subTest(option=option):
+                self.refuse(2, [option, "must be"], self.models / "a.off", option, value)
+                self.assertNotIn("_", run("sqbake", "bake", "a.off", "-o", "a.h5", option, value).stderr)
+
     def test_a_dry_run_refuses_an_output_that_a_run_would(self):
         source = self.models / "a.off"
         for arguments in (("-o", self.folder / "none" / "x.h5"), ("-o", source / "x.h5"), ("--out-dir", source),
@@ -178,7 +198,7 @@ class Settings(FolderTest):
                  ("sqbake.toml", '[default]\nquality = "good"\n', [":2", "`good`", "draft, standard, fine"]),
                  ("sqbake.toml", "[default\n", ["sqbake.toml:1"]),
                  ("sqbake.toml", "[[rule]]\nunit = 1\n", [":1", "match"]),
-                 ("sqbake.toml", "[default]\nmax-parts = 0\n", [":2", "max_parts = 0"]),
+                 ("sqbake.toml", "[default]\nmax-parts = 0\n", [":2", "--max-parts = 0"]),
                  ("props/chair.sqbake.toml", "max-err = 1\n", ["chair.sqbake.toml:1", "did you mean `max-error`?"])]
         for name, text, named in cases:
             with self.subTest(text=text):

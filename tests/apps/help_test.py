@@ -55,7 +55,7 @@ class Usage(unittest.TestCase):
         (("sqbake", "bake", "x.off", "-o", "x.h5", "--max-error", "-1%"), "`-1%`"),
         (("sqbake", "bake", "x.off", "-o", "x.h5", "--max-error", "1 acre"), "`1 acre`"),
         (("sqbake", "bake", "x.off", "-o", "x.h5", "--max-bytes", "12X"), "`12X`"),
-        (("sqbake", "bake", "x.off", "-o", "x.h5", "--max-parts", "0"), "max_parts"),
+        (("sqbake", "bake", "x.off", "-o", "x.h5", "--max-parts", "0"), "--max-parts = 0"),
         (("sqbake", "bake", "x.off", "-o", "x.h5", "--repair", "some"), "--repair"),
         (("sqbake", "bake", "x.off", "-o", "x.h5", "--timeout", "soon"), "`soon`"),
         (("sqbake", "bake", "x.off", "-o", "x.h5", "--memory", "4M"), "16M"),
