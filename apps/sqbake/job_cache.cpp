@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "job_cache.hpp"
 
-#include <cstdlib>
 #include <utility>
 
 #include "sqmap/bake/version.hpp"
@@ -12,8 +11,6 @@ std::optional<BundleCache> open_cache(const BakeArguments& arguments) {
   // Neither a check of the baker nor its debugging has a use for what was baked before.
   if (!arguments.use_cache || arguments.verify_determinism || arguments.no_isolation) return std::nullopt;
   if (!arguments.cache.empty()) return BundleCache(arguments.cache);
-  if (const char* given = std::getenv("SQMAP_CACHE_DIR"); given != nullptr && *given == '\0')
-    return std::nullopt;
   if (auto folder = BundleCache::default_folder()) return BundleCache(*std::move(folder));
   return std::nullopt;
 }

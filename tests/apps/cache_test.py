@@ -182,6 +182,24 @@ class Cache(FolderTest):
         self.assert_exit(missing, 3)
 
 
+class Environment(FolderTest):
+    def test_an_empty_name_means_no_cache_for_every_command(self):
+        write_off(self.folder / "ball.off", sphere(0))
+        environment = {**os.environ, "HOME": str(self.folder), "XDG_CACHE_HOME": str(self.folder / "xdg")}
+        environment.pop("SQMAP_CACHE_DIR", None)
+        bake = ("bake", self.folder / "ball.off", *ROUGH, "-o", self.folder / "ball.h5")
+        self.assert_exit(run("sqbake", *bake, env=environment), 0)
+        for command in ("stats", "verify", "gc"):
+            self.assert_exit(run("sqbake", "cache", command, env=environment), 0)
+        before = self.files()
+        for command in ("stats", "verify", "gc"):
+            result = run("sqbake", "cache", command, env={**environment, "SQMAP_CACHE_DIR": ""})
+            self.assert_exit(result, 2)
+            self.assertIn("no cache folder: SQMAP_CACHE_DIR is set to nothing", result.stderr)
+        self.assert_exit(run("sqbake", *bake, "--unit", "mm", env={**environment, "SQMAP_CACHE_DIR": ""}), 0)
+        self.assertEqual(self.files(), before)
+
+
 class LargeFolder(FolderTest):
     def test_a_second_run_over_380_meshes_bakes_none_and_writes_nothing(self):
         models, out = self.folder / "models", self.folder / "out"

@@ -93,11 +93,12 @@ Error changed(const std::string& name) {
 }  // namespace
 
 std::optional<fs::path> BundleCache::default_folder() {
+  if (const char* given = std::getenv("SQMAP_CACHE_DIR"); given != nullptr)
+    return *given == '\0' ? std::nullopt : std::optional<fs::path>(given);
   const auto value = [](const char* name) {
     const char* text = std::getenv(name);
     return text != nullptr ? fs::path(text) : fs::path();
   };
-  if (const fs::path given = value("SQMAP_CACHE_DIR"); !given.empty()) return given;
   if (const fs::path base = value("XDG_CACHE_HOME"); base.is_absolute()) return base / "sqmap";
   if (const fs::path home = value("HOME"); home.is_absolute()) return home / ".cache" / "sqmap";
   return std::nullopt;

@@ -57,7 +57,8 @@ class BundleCache {
  public:
   explicit BundleCache(std::filesystem::path folder) : store_(std::move(folder)) {}
 
-  /// SQMAP_CACHE_DIR, else sqmap in XDG_CACHE_HOME, else .cache/sqmap in HOME; none where all are unset.
+  /// SQMAP_CACHE_DIR, else sqmap in XDG_CACHE_HOME, else .cache/sqmap in HOME; none where all are
+  /// unset, or where SQMAP_CACHE_DIR is set to nothing.
   static std::optional<std::filesystem::path> default_folder();
 
   const std::filesystem::path& folder() const noexcept { return store_.folder(); }
