@@ -36,7 +36,8 @@ if(SQMAP_BUILD_BAKE)
   install(EXPORT sqmap-bake FILE sqmap-bake-targets.cmake NAMESPACE sqmap:: DESTINATION ${SQMAP_PACKAGE_DIR})
   install(FILES ${CMAKE_CURRENT_LIST_DIR}/SqmapBake.cmake DESTINATION ${SQMAP_PACKAGE_DIR})
   # What the records of `sqbake bake --format ndjson` keep to.
-  install(FILES ${PROJECT_SOURCE_DIR}/apps/sqbake/bake.schema.json DESTINATION ${CMAKE_INSTALL_DATADIR}/sqmap)
+  install(FILES ${PROJECT_SOURCE_DIR}/apps/sqbake/bake.schema.json ${PROJECT_SOURCE_DIR}/apps/sqbake/tools.schema.json
+    DESTINATION ${CMAKE_INSTALL_DATADIR}/sqmap)
   # Each program writes its own man page and completion scripts.
   set(SQMAP_SHELL_DOCS ${PROJECT_BINARY_DIR}/shell_docs)
   file(MAKE_DIRECTORY ${SQMAP_SHELL_DOCS})

@@ -110,6 +110,39 @@ class Records(FolderTest):
         self.assertFalse(json.loads(result.stdout.splitlines()[0])["cached"])
 
 
+class Tools(FolderTest):
+    def test_what_the_other_commands_print_keeps_to_their_schema(self):
+        folder = Path(os.environ["SQMAP_SOURCE_DIR"]) / "apps" / "sqbake"
+        schema = json.loads((folder / "tools.schema.json").read_text(encoding="utf-8"))
+        self.assertEqual(schema["definitions"]["mesh"], SCHEMA["definitions"]["mesh"])
+        jsonschema.Draft7Validator.check_schema(schema)
+        validator = jsonschema.Draft7Validator(schema)
+        ball, cache = write_off(self.folder / "ball.off", sphere(0)), self.folder / "cache"
+        write_off(self.folder / "open.off", (box()[0], box()[1][2:]))
+        baked = run("sqbake", "bake", ball, *ROUGH, "-o", self.folder / "ball.h5", "--cache", cache, "--format", "ndjson")
+        (self.folder / "records.ndjson").write_text(baked.stdout, encoding="utf-8")
+        plan = run("sqbake", "plan", self.folder, "--out-dir", self.folder, "--shards", "2", "--format", "ndjson").stdout
+        (self.folder / "plan.ndjson").write_text(plan, encoding="utf-8")
+        merged = run("sqbake", "merge", self.folder / "records.ndjson", "--plan", self.folder / "plan.ndjson").stdout
+        printed = [*plan.splitlines(), merged.splitlines()[-1],
+                   run("sqbake", "check", self.folder / "open.off", "--format", "json", "--repair", "none").stdout,
+                   run("sqbake", "config", "show", ball, "--max-parts", "3", "--format", "json").stdout,
+                   *(run("sqbake", "cache", command, "--cache", cache, "--format", "json").stdout
+                     for command in ("stats", "verify", "gc"))]
+        records = [json.loads(text) for text in printed]
+        self.assertEqual([(r["schema"], r.get("type")) for r in records],
+                         2 * [("sqmap.plan/1", "plan")] + [("sqmap.merge/1", "summary"), ("sqmap.check/1", None),
+                         ("sqmap.config/1", None), ("sqmap.cache/1", "stats"), ("sqmap.cache/1", "verify"),
+                         ("sqmap.cache/1", "gc")])
+        self.assertEqual(records[2]["missing"], [str(self.folder / "open.h5")])
+        for record in records:
+            validator.validate(record)
+            for name in record.keys() - {"outcomes"}:
+                for wrong in ({k: v for k, v in record.items() if k != name}, {**record, name: {"x": []}},
+                              {**record, "unknown": 1}):
+                    self.assertFalse(validator.is_valid(wrong), (record["schema"], name))
+
+
 class Terminal(FolderTest):
     def on_terminal(self, environment, *arguments):
         """What a terminal sees of the messages."""

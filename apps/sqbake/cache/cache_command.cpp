@@ -149,7 +149,8 @@ std::function<Exit(Console&)> declare_cache(CLI::App& app) {
       "  sqbake cache verify --cache /net/shared/sqmap\n"
       "  sqbake cache gc --max-size 500M --max-age 90\n");
   app.add_option("--cache", args->folder,
-                 "Folder (default: SQMAP_CACHE_DIR, else sqmap in XDG_CACHE_HOME,\nelse ~/.cache/sqmap; none where SQMAP_CACHE_DIR is set to nothing)")
+                 "Folder (default: SQMAP_CACHE_DIR, else sqmap in XDG_CACHE_HOME,\n"
+                 "else ~/.cache/sqmap; none where SQMAP_CACHE_DIR is set to nothing)")
       ->type_name("DIR");
   add_words(app, "--format", args->format, {"text", "json"}, "text or json (default text)")
       ->type_name("FORMAT");
@@ -164,7 +165,8 @@ std::function<Exit(Console&)> declare_cache(CLI::App& app) {
     if (folder->empty()) folder = BundleCache::default_folder();
     if (!folder) {
       console.error(
-          "no cache folder: SQMAP_CACHE_DIR is set to nothing, or it, XDG_CACHE_HOME and HOME are unset; name "
+          "no cache folder: SQMAP_CACHE_DIR is set to nothing, or it, XDG_CACHE_HOME and HOME are unset; "
+          "name "
           "one with --cache DIR");
       return Exit::kUsage;
     }
