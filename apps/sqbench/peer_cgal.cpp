@@ -56,7 +56,7 @@ class CgalPeer : public Peer {
            triangles_.size() * (sizeof(Primitive) + sizeof(CGAL::Bbox_3) + 2 * sizeof(void*)) +
            triangles_.size() * (sizeof(Kernel::Point_3) + sizeof(Primitive));
   }
-  StatedError stated_error() const override { return {1e-4, false}; }
+  StatedError stated_error() const override { return kExactError; }
 
  private:
   const bake::Mesh& mesh_;

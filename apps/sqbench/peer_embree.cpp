@@ -23,7 +23,7 @@ class EmbreePeer : public Peer {
     }
   }
   std::size_t bytes() const override { return sizeof(*this) + closest_.bytes() + normals_.bytes(); }
-  StatedError stated_error() const override { return {1e-4, false}; }
+  StatedError stated_error() const override { return kExactError; }
 
  private:
   EmbreeClosest closest_;

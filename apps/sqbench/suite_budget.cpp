@@ -91,6 +91,8 @@ std::optional<BuiltPeer> finest(const Ladder& ladder, const Model& model, double
   return best;
 }
 
+constexpr double kLeastBytes = 4096;  // that the baker takes for a limit
+
 /// Bakes with ever lower limits until what the runtime keeps fits. Parts cost half a kilobyte each before
 /// their maps begin, so small budgets get few.
 std::optional<Model> bake_within(const Model& model, double budget_bytes, bool is_smoke) {
@@ -99,7 +101,7 @@ std::optional<Model> bake_within(const Model& model, double budget_bytes, bool i
   options.max_error_percent = is_smoke ? 0.5 : 0.005;  // the limit is to be the memory
   if (is_smoke) options.sample_count = 2000;
   for (double share = 0.9; share > 0.3; share *= 0.8) {
-    options.max_bytes = static_cast<std::uint64_t>(share * budget_bytes);
+    options.max_bytes = static_cast<std::uint64_t>(std::max(share * budget_bytes, kLeastBytes));
     options.max_parts = static_cast<std::uint32_t>(std::clamp(share * budget_bytes / 2048, 2.0, 48.0));
     std::optional<Model> baked = baked_again(model, options);
     const auto object = runtime::Object::build(baked->asset);
