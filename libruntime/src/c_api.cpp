@@ -9,6 +9,7 @@
 #include <string>
 
 #include "sqmap/asset/validate.hpp"
+#include "sqmap/runtime/budget.hpp"
 #include "sqmap/runtime/contacts.hpp"
 
 namespace sqmap::runtime {
@@ -349,6 +350,67 @@ sqmap_status sqmap_all_contacts(const sqmap_instance* instance, const float* poi
                         {reinterpret_cast<Contact*>(contacts), capacity}, query_options(options))
                .found;
   return SQMAP_OK;
+}
+
+sqmap_status sqmap_body_build(const float* points_m, std::size_t point_count, sqmap_body** body,
+                              sqmap_error* error) {
+  if (body == nullptr || (points_m == nullptr && point_count > 0))
+    return c_failure(SQMAP_NULL_ARGUMENT, "points or body is NULL", "pass both", error);
+  return c_guarded(error, [&] {
+    auto built = PointBody::build(vectors(points_m, point_count));
+    if (!built)
+      return c_failure(SQMAP_BAD_OPTION, built.error().finding.c_str(), built.error().remedy.c_str(), error);
+    *body = std::make_unique<sqmap_body>(sqmap_body{std::move(built).value()}).release();
+    return SQMAP_OK;
+  });
+}
+
+void sqmap_body_destroy(sqmap_body* body) { std::unique_ptr<sqmap_body>{body}.reset(); }
+
+sqmap_status sqmap_body_refit(sqmap_body* body, const float* points_m, std::size_t point_count) {
+  if (body == nullptr || (points_m == nullptr && point_count > 0)) return SQMAP_NULL_ARGUMENT;
+  return body->body.refit(vectors(points_m, point_count)) ? SQMAP_OK : SQMAP_BAD_OPTION;
+}
+
+sqmap_status sqmap_body_contacts(const sqmap_object* object, const sqmap_body* body,
+                                 const sqmap_body_placement* placement, const sqmap_body_options* options,
+                                 sqmap_work_budget* budget, sqmap_contact* contacts, std::size_t capacity,
+                                 std::size_t* found) {
+  if (object == nullptr || body == nullptr || placement == nullptr || found == nullptr ||
+      (contacts == nullptr && capacity > 0))
+    return SQMAP_NULL_ARGUMENT;
+  if (!is_known(options) || !is_known(budget)) return SQMAP_STRUCT_SIZE;
+  ContactQuery query;
+  if (options != nullptr) {
+    if (options->layer > SQMAP_LAYER_3 || options->seek > SQMAP_SEEK_DEEPEST || !(options->within_m >= 0))
+      return SQMAP_BAD_OPTION;
+    query = {query_options(options->layer, options->level, options->edge_length_m), options->within_m,
+             static_cast<Seek>(options->seek)};
+  }
+  if (!(placement->scale > 0)) return SQMAP_BAD_OPTION;
+  const double* q = placement->orientation_wxyz;
+  const BodyPlacement placed{{{q[0], q[1], q[2], q[3]}, vector(placement->translation_m)}, placement->scale};
+  const std::span<Contact> room(reinterpret_cast<Contact*>(contacts), capacity);
+  if (budget == nullptr) {
+    *found = object->object.contacts(body->body, placed, room, query);
+    return SQMAP_OK;
+  }
+  WorkBudget work{budget->units};
+  *found = object->object.contacts(body->body, placed, room, query, work);
+  budget->spent = work.spent;
+  budget->layer = static_cast<std::uint32_t>(work.layer);
+  budget->level = work.level;
+  return SQMAP_OK;
+}
+
+std::uint64_t sqmap_work_units(double units_per_us, double us) {
+  return WorkRate(units_per_us).units_for(us);
+}
+
+double sqmap_work_learned(double units_per_us, std::uint64_t spent, double took_us) {
+  WorkRate rate(units_per_us);
+  rate.learn(spent, took_us);
+  return rate.units_per_us();
 }
 
 sqmap_status sqmap_sweep(const sqmap_instance* start, const sqmap_instance* end, const float* from_m,

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "sqmap/asset/result.hpp"
+#include "sqmap/runtime/body.hpp"
 #include "sqmap/runtime/sweep.hpp"
 #include "sqmap/sqmap.h"
 
@@ -12,6 +13,10 @@
 struct sqmap_object {  // NOLINT(readability-identifier-naming): a name of C
   sqmap::runtime::Object object;
   sqmap::runtime::Sweeper sweeper;
+};
+
+struct sqmap_body {  // NOLINT(readability-identifier-naming): a name of C
+  sqmap::runtime::PointBody body;
 };
 
 namespace sqmap::runtime {

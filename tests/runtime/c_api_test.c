@@ -217,6 +217,87 @@ static void sweeps(const sqmap_object* object, const sqmap_instance* instance) {
   SQMAP_CHECK(sqmap_sweep(instance, &end, from, from, 1, &options, results) == SQMAP_STRUCT_SIZE);
 }
 
+// The ball in its own frame, which is at the origin with the radius that finds_contacts() uses.
+static void meets_a_body(const sqmap_object* object) {
+  // Far apart, so that most blocks are dropped: in contact are 7 and 150 alone.
+  enum { kPoints = 200 };
+  float points[3 * kPoints];
+  for (size_t i = 0; i < kPoints; ++i) {
+    points[3 * i] = 3 + (float)i;
+    points[3 * i + 1] = points[3 * i + 2] = 0;
+  }
+  sqmap_object_info info = SQMAP_OBJECT_INFO_INIT;
+  SQMAP_CHECK(sqmap_object_get_info(object, &info) == SQMAP_OK);
+  const float centre[3] = {(float)info.sphere_m[0], (float)info.sphere_m[1], (float)info.sphere_m[2]};
+  for (int k = 0; k < 3; ++k) {
+    points[3 * 7 + k] = centre[k] + (k == 0 ? 0.3F : 0);
+    points[3 * 150 + k] = centre[k] + (k == 1 ? 0.35F : 0);
+  }
+  sqmap_body* body = NULL;
+  SQMAP_CHECK(sqmap_body_build(points, kPoints, &body, NULL) == SQMAP_OK);
+  SQMAP_CHECK(sqmap_body_build(NULL, 1, &body, NULL) == SQMAP_NULL_ARGUMENT);
+  if (body == NULL) return;
+
+  const sqmap_body_placement here = {{1, 0, 0, 0}, {0, 0, 0}, 1}, away = {{1, 0, 0, 0}, {0, 50, 0}, 1};
+  sqmap_contact contacts[4];
+  size_t found = 9;
+  SQMAP_CHECK(sqmap_body_contacts(object, body, &here, NULL, NULL, contacts, 4, &found) == SQMAP_OK &&
+              found == 2);
+  SQMAP_CHECK(contacts[0].point + contacts[1].point == 157 && contacts[0].depth_m > 0);
+  SQMAP_CHECK(sqmap_body_contacts(object, body, &here, NULL, NULL, NULL, 0, &found) == SQMAP_OK &&
+              found == 2);
+  SQMAP_CHECK(sqmap_body_contacts(object, body, &away, NULL, NULL, contacts, 4, &found) == SQMAP_OK &&
+              found == 0);
+
+  sqmap_body_options options = SQMAP_BODY_OPTIONS_INIT;
+  options.layer = SQMAP_LAYER_3;
+  options.seek = SQMAP_SEEK_DEEPEST;
+  SQMAP_CHECK(sqmap_body_contacts(object, body, &here, &options, NULL, contacts, 4, &found) == SQMAP_OK &&
+              found == 1);
+  SQMAP_CHECK(contacts[0].point == 7);  // it lies deeper
+
+  // Whatever the units, layer 1 is afforded and finds both; with enough of them layer 3 is reached.
+  options.seek = SQMAP_SEEK_ALL;
+  sqmap_work_budget budget = SQMAP_WORK_BUDGET_INIT;
+  SQMAP_CHECK(sqmap_body_contacts(object, body, &here, &options, &budget, contacts, 4, &found) == SQMAP_OK);
+  SQMAP_CHECK(budget.layer == SQMAP_LAYER_1 && budget.spent > 0 && found == 2);
+  const uint64_t least = budget.spent;
+  budget.units = 1000000;
+  SQMAP_CHECK(sqmap_body_contacts(object, body, &here, &options, &budget, contacts, 4, &found) == SQMAP_OK);
+  SQMAP_CHECK(budget.layer == SQMAP_LAYER_3 && budget.spent > least && budget.spent <= budget.units &&
+              found == 2);
+
+  points[3 * 7] = 500;
+  SQMAP_CHECK(sqmap_body_refit(body, points, kPoints) == SQMAP_OK);
+  SQMAP_CHECK(sqmap_body_contacts(object, body, &here, NULL, NULL, contacts, 4, &found) == SQMAP_OK &&
+              found == 1);
+  SQMAP_CHECK(contacts[0].point == 150);
+  SQMAP_CHECK(sqmap_body_refit(body, points, kPoints - 1) == SQMAP_BAD_OPTION);
+  points[0] = NAN;
+  SQMAP_CHECK(sqmap_body_refit(body, points, kPoints) == SQMAP_BAD_OPTION);
+
+  options.seek = 3;
+  SQMAP_CHECK(sqmap_body_contacts(object, body, &here, &options, NULL, contacts, 4, &found) ==
+              SQMAP_BAD_OPTION);
+  budget.struct_size = 0;
+  SQMAP_CHECK(sqmap_body_contacts(object, body, &here, NULL, &budget, contacts, 4, &found) ==
+              SQMAP_STRUCT_SIZE);
+  SQMAP_CHECK(sqmap_body_contacts(object, NULL, &here, NULL, NULL, contacts, 4, &found) ==
+              SQMAP_NULL_ARGUMENT);
+  sqmap_body_destroy(body);
+  sqmap_body_destroy(NULL);
+
+  sqmap_error error = SQMAP_ERROR_INIT;
+  SQMAP_CHECK(sqmap_body_build(points, kPoints, &body, &error) == SQMAP_BAD_OPTION);
+  SQMAP_CHECK(strstr(error.finding, "point 0") != NULL);
+}
+
+static void keeps_a_rate(void) {
+  SQMAP_CHECK(sqmap_work_units(20, 100) == 2000 && sqmap_work_units(20, NAN) == 0);
+  const double slower = sqmap_work_learned(20, 1000, 100), faster = sqmap_work_learned(20, 10000, 100);
+  SQMAP_CHECK(slower < 20 && slower > 10 && faster > 20 && faster < 100);
+}
+
 static void all_about(sqmap_object* object) {
   if (object == NULL) return;
   tells_about_the_object(object);
@@ -226,6 +307,7 @@ static void all_about(sqmap_object* object) {
   finds_contacts(&instance);
   tells_what_is_sure(object, &instance);
   sweeps(object, &instance);
+  meets_a_body(object);
   sqmap_object_destroy(object);
 }
 
@@ -260,6 +342,7 @@ int main(int argc, char** argv) {
   SQMAP_CHECK(strcmp(sqmap_status_text(SQMAP_OK), "done") == 0);
   SQMAP_CHECK(strcmp(sqmap_status_text(-1), "unknown status") == 0);
   refuses_broken_descriptions();
+  keeps_a_rate();
   all_about(made_ball());
 #ifdef SQMAP_TEST_LOAD
   SQMAP_CHECK(argc == 2);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// sqmap for C (C99 and later): what sqmap::runtime does, and in the last section the reader of bundles. The
-// headers in sqmap/runtime say more about each call than is repeated here.
+// sqmap for C (C99 and later): what sqmap::runtime does but for effects and scenes, and in the last section
+// the reader of bundles. The headers in sqmap/runtime say more about each call than is repeated here.
 //
 // - An object is an opaque handle, made by sqmap_object_build or _load_..., freed by sqmap_object_destroy. It
 //   is immutable, so any number of threads may use one. Instances are plain values of the caller's.
@@ -206,6 +206,64 @@ SQMAP_API sqmap_status sqmap_deepest_contact(const sqmap_instance* instance, con
 SQMAP_API sqmap_status sqmap_all_contacts(const sqmap_instance* instance, const float* points_m,
                                           size_t point_count, const sqmap_query_options* options,
                                           sqmap_contact* contacts, size_t capacity, size_t* found);
+
+// Bodies: the points of a second object, in blocks that are dropped together where they are far
+
+typedef struct sqmap_body sqmap_body;
+
+// Copies the points. SQMAP_BAD_OPTION: one is not finite, or there are too many.
+SQMAP_API sqmap_status sqmap_body_build(const float* points_m, size_t point_count, sqmap_body** body,
+                                        sqmap_error* error);
+SQMAP_API void sqmap_body_destroy(sqmap_body* body);  // NULL: nothing
+// New places of the same points, for bodies that deform; does not allocate, and no other thread may use the
+// body meanwhile. SQMAP_BAD_OPTION, and nothing changes: another count, or a point that is not finite.
+SQMAP_API sqmap_status sqmap_body_refit(sqmap_body* body, const float* points_m, size_t point_count);
+
+// p_object = scale * R * p_body + t
+typedef struct sqmap_body_placement {
+  double orientation_wxyz[4];
+  double translation_m[3];
+  double scale;
+} sqmap_body_placement;
+
+enum { SQMAP_SEEK_ALL = 0, SQMAP_SEEK_ANY = 1, SQMAP_SEEK_DEEPEST = 2 };
+
+typedef struct sqmap_body_options {
+  uint32_t struct_size;
+  uint32_t layer, level;
+  float edge_length_m;
+  float within_m;  // signed distances below this are contacts
+  uint32_t seek;   // SQMAP_SEEK_
+} sqmap_body_options;
+#define SQMAP_BODY_OPTIONS_INIT \
+  { sizeof(sqmap_body_options), SQMAP_LAYER_AUTO, 0, 0, 0, SQMAP_SEEK_ALL }
+
+// What a question may cost, in units of work that are the same on every machine: the deepest layer that fits
+// is used, at least layer 1.
+typedef struct sqmap_work_budget {
+  uint32_t struct_size;
+  uint32_t layer;  // out: SQMAP_LAYER_ that was afforded
+  uint64_t units;  // in
+  uint64_t spent;  // out
+  uint32_t level;  // out
+  uint32_t reserved;
+} sqmap_work_budget;
+#define SQMAP_WORK_BUDGET_INIT \
+  { sizeof(sqmap_work_budget), SQMAP_LAYER_AUTO, 0, 0, 0, 0 }
+
+// Contacts in the object's frame, in an order that is the same every time, their points by the caller's
+// index. The first `capacity` are written; *found counts all, with SEEK_ANY and _DEEPEST at most 1.
+// budget: NULL for none.
+SQMAP_API sqmap_status sqmap_body_contacts(const sqmap_object* object, const sqmap_body* body,
+                                           const sqmap_body_placement* placement,
+                                           const sqmap_body_options* options, sqmap_work_budget* budget,
+                                           sqmap_contact* contacts, size_t capacity, size_t* found);
+
+// Turns microseconds into units, by what frames before took; the caller holds the clock and the rate.
+#define SQMAP_UNITS_PER_US 20.0  // until frames have been seen
+SQMAP_API uint64_t sqmap_work_units(double units_per_us, double us);
+// The rate after a frame that spent so much in such a time.
+SQMAP_API double sqmap_work_learned(double units_per_us, uint64_t spent, double took_us);
 
 // Swept queries
 
