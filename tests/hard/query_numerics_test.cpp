@@ -13,6 +13,7 @@
 
 #include "hard/reference.hpp"
 #include "hard/shells.hpp"
+#include "hard/surface_search.hpp"
 
 namespace sqmap::runtime {
 namespace {
