@@ -45,6 +45,7 @@ Outcome build(const LoadedScene& loaded, Obstacles& obstacles) {
 
 struct Collided {
   std::uint32_t contacts{};
+  double deepest_m{};
   Vec3d impulse_n_s;  ///< on the cloth
 };
 
@@ -67,6 +68,8 @@ Collided collide(Cloth& cloth, Obstacles& obstacles, const ClothEntry& entry,
         continue;
       }
       ++result.contacts;
+      result.deepest_m =
+          std::max(result.deepest_m, -static_cast<double>(obstacles.distance_m[i]));  // NaN: as it was
     }
   }
   return result;
@@ -86,6 +89,8 @@ Outcome run_cloth(Console& console, const LoadedScene& loaded, const RunOptions&
   Obstacles obstacles;
   if (Outcome ok = build(loaded, obstacles); !ok) return ok;
   Cloth cloth(entry);
+  runtime::QueryOptions query = loaded.file.options.query;
+  query.edge_length_m = static_cast<float>(entry.edge_m / (entry.nodes_along_edge - 1));
   obstacles.distance_m.resize(cloth.nodes_m().size());
   obstacles.normal.resize(cloth.nodes_m().size());
   obstacles.inside.resize(cloth.nodes_m().size());
@@ -101,7 +106,7 @@ Outcome run_cloth(Console& console, const LoadedScene& loaded, const RunOptions&
     clock.begin();
     cloth.step(step_s);
     const Clock::time_point fallen = Clock::now();
-    const Collided collided = collide(cloth, obstacles, entry, loaded.file.options.query);
+    const Collided collided = collide(cloth, obstacles, entry, query);
     ours_us.push_back(std::chrono::duration<double, std::micro>(Clock::now() - fallen).count());
     whole_us.push_back(clock.end());
     rows[i] = {static_cast<double>(i + 1) * step_s,
@@ -110,7 +115,8 @@ Outcome run_cloth(Console& console, const LoadedScene& loaded, const RunOptions&
                {},
                collided.contacts,
                static_cast<int>(loaded.file.options.query.layer),
-               ours_us.back()};
+               ours_us.back(),
+               collided.deepest_m};
   }
   console.out(fmt::format("cloth of {} nodes, {} frames at {} Hz{}\n", cloth.nodes_m().size(), rows.size(),
                           loaded.file.rate_hz, options.is_fast ? ", not waited for" : ""));

@@ -65,13 +65,18 @@ Outcome run_probe(Console& console, const LoadedScene& loaded, const RunOptions&
     row.contacts = result.inside;
     row.layer = static_cast<int>(result.layer);
     row.microseconds = clock.end();
+    for (std::size_t k = 0; k < objects.size(); ++k)
+      for (const runtime::Contact& contact : scene.contacts(k))
+        row.deepest_m = std::max(row.deepest_m, static_cast<double>(contact.depth_m));
   }
 
   std::vector<double> microseconds;
   std::size_t touching = 0;
+  double deepest_m = 0;
   for (const TraceRow& row : rows) {
     microseconds.push_back(row.microseconds);
     touching += row.contacts > 0 ? 1 : 0;
+    deepest_m = std::max(deepest_m, row.deepest_m);
   }
   const Jumps jumps = force_jumps(rows);
   console.out(fmt::format("{} objects of {} parts, {:.1f} KiB; probe of {} points; {} frames at {} Hz{}\n",
@@ -81,8 +86,9 @@ Outcome run_probe(Console& console, const LoadedScene& loaded, const RunOptions&
   console.out(latency_text(microseconds));
   console.out(fmt::format("missed deadlines: {} ({} of them begun late by the system)\n", clock.missed(),
                           clock.overslept()));
-  console.out(fmt::format("in contact: {} frames; force jumps > 10 %: {} of {} steps in contact\n", touching,
-                          jumps.jumps, jumps.steps));
+  console.out(fmt::format(
+      "in contact: {} frames, at most {:.1f} mm deep; force jumps > 10 %: {} of {} steps in contact\n",
+      touching, 1e3 * deepest_m, jumps.jumps, jumps.steps));
   return options.output.empty() ? Outcome(Done{}) : write_outputs(loaded, rows, options.output);
 }
 

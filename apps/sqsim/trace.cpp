@@ -62,15 +62,16 @@ std::string trace_csv(std::span<const TraceRow> rows) {
   std::string text =
       "time_s,x_m,y_m,z_m,qw,qx,qy,qz,force_x_n,force_y_n,force_z_n,torque_x_nm,torque_y_nm,torque_z_nm,"
       "contacts,"
-      "layer,microseconds\n";
+      "layer,microseconds,deepest_m\n";
   for (const TraceRow& row : rows) {
     const Vec3d& p = row.pose.translation_m;
     const Quaternion& q = row.pose.orientation;
     fmt::format_to(std::back_inserter(text), "{:.6f},{:.7g},{:.7g},{:.7g},{:.7g},{:.7g},{:.7g},{:.7g},",
                    row.time_s, p.x, p.y, p.z, q.w, q.x, q.y, q.z);
-    fmt::format_to(std::back_inserter(text), "{:.6g},{:.6g},{:.6g},{:.6g},{:.6g},{:.6g},{},{},{:.2f}\n",
-                   row.force_n.x, row.force_n.y, row.force_n.z, row.torque_nm.x, row.torque_nm.y,
-                   row.torque_nm.z, row.contacts, row.layer, row.microseconds);
+    fmt::format_to(std::back_inserter(text),
+                   "{:.6g},{:.6g},{:.6g},{:.6g},{:.6g},{:.6g},{},{},{:.2f},{:.6g}\n", row.force_n.x,
+                   row.force_n.y, row.force_n.z, row.torque_nm.x, row.torque_nm.y, row.torque_nm.z,
+                   row.contacts, row.layer, row.microseconds, row.deepest_m);
   }
   return text;
 }

@@ -17,6 +17,7 @@ struct TraceRow {
   std::uint32_t contacts{};
   int layer{};
   double microseconds{};
+  double deepest_m{};  ///< of the contacts; 0 without
 };
 
 /// CSV with a header line.

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """README.md shows the sample as it is, and names only files that exist. Usage: readme_test.py"""
+import json
 import os
 import re
 import unittest
@@ -27,6 +28,11 @@ class Readme(unittest.TestCase):
         named |= set(re.findall(r"(?<![\w/.])(?:scripts|formats|samples|tests)/[\w./-]*\w", self.readme))
         self.assertGreater(len(named), 8, "the patterns no longer find the names")
         self.assertEqual([], sorted(name for name in named if not os.path.exists(os.path.join(ROOT, name))))
+
+    def test_its_scene_has_as_many_parts_as_the_papers(self):
+        parts = {name: int(count) for name, count in re.findall(r"^(\w+)[.]off +(\d+) ", self.readme, re.MULTILINE)}
+        scene = json.loads(text_of("samples/scenes/object_recognition.json"))
+        self.assertGreaterEqual(sum(parts[item["bundle"].removesuffix(".h5")] for item in scene["objects"]), 89)
 
     def test_scripts_it_names_can_be_run(self):
         scripts = set(re.findall(r"scripts/[a-z_]+(?![\w./])", self.readme))
