@@ -16,6 +16,9 @@
 namespace sqmap::test {
 
 inline constexpr std::array<double, 5> kExponents{0.1, 0.3, 1.0, 1.9, 2.0};
+inline constexpr std::array<Vec3d, 7> kHardAxes{Vec3d{1, 1, 1},   {0.1, 1, 1},     {1, 0.1, 0.1},
+                                                {0.5, 1, 0.01},   {0.01, 0.01, 1}, {1, 0.001, 1},
+                                                {1, 0.001, 0.001}};
 inline constexpr std::array<runtime::SimdTarget, 4> kTargets{
     runtime::SimdTarget::kBaseline, runtime::SimdTarget::kSse4, runtime::SimdTarget::kAvx2,
     runtime::SimdTarget::kAvx512};
