@@ -16,6 +16,7 @@
 #include "sqmap/bake/bake.hpp"
 #include "sqmap/io/bundle.hpp"
 
+#include "determinism.hpp"
 #include "mesh_size.hpp"
 #include "worker_pool.hpp"
 
@@ -53,14 +54,6 @@ void mark_fallback(Provenance& provenance) {
 std::string as_utf8(const std::string& name) {
   using Json = nlohmann::json;
   return Json::parse(Json(name).dump(-1, ' ', false, Json::error_handler_t::replace)).get<std::string>();
-}
-
-/// Where two bakes of one input differ; empty: nowhere.
-std::string difference(const std::vector<std::uint8_t>& a, const std::vector<std::uint8_t>& b) {
-  if (a == b) return "";
-  if (a.size() != b.size()) return fmt::format("one has {} bytes, the other {}", a.size(), b.size());
-  const auto at = std::ranges::mismatch(a, b).in1 - a.begin();
-  return fmt::format("of {} bytes, that at {} is the first that differs", a.size(), at);
 }
 
 std::optional<Error> bake_into(BakeProduct& product, const BakeJob& job, const AssetOptions& asked,
@@ -125,32 +118,13 @@ BakeProduct bake_once(const BakeJob& job, unsigned threads, const bake::Progress
   return product;
 }
 
-/// Bakes the mesh once more with another number of threads and fails the record where the bytes differ.
-void verify(BakeProduct& product, const BakeJob& job, const bake::Progress& progress) {
-  const unsigned other_threads = job.threads == 1 ? 2 : 1;
-  const Clock::time_point start = Clock::now();
-  const BakeProduct again = bake_once(job, other_threads, progress);
-  BakeRecord& record = product.record;
-  record.times.push_back({"verify", seconds_since(start)});
-  if (again.record.error) {
-    record.verdict = again.record.verdict;
-    record.error = again.record.error;
-  } else if (const std::string where = difference(product.bundle, again.bundle); !where.empty()) {
-    record.verdict = Verdict::kFailed;
-    record.error =
-        Error{Status::kBakeFailed,
-              fmt::format("two bakes, with {} and {} threads, differ: {}", job.threads, other_threads, where),
-              "report this with the mesh"};
-  }
-  if (record.error) product.bundle.clear();
-}
-
 }  // namespace
 
 BakeProduct bake_asset(const BakeJob& job, const bake::Progress& progress) {
   const Clock::time_point start = Clock::now();
   BakeProduct product = bake_once(job, job.threads, progress);
-  if (job.verify_determinism && !product.record.error) verify(product, job, progress);
+  if (job.verify_determinism && !product.record.error)
+    verify_determinism(product, job, [&](unsigned threads) { return bake_once(job, threads, progress); });
   BakeRecord& record = product.record;
   record.input = job.input.string();
   if (!record.error && !record.degradations.empty()) record.verdict = Verdict::kDegraded;
