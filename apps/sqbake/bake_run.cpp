@@ -12,6 +12,7 @@
 
 #include "sqmap/io/bundle.hpp"
 
+#include "../common/confinement.hpp"
 #include "../common/files.hpp"
 #include "depfile.hpp"
 #include "job_cache.hpp"
@@ -67,6 +68,12 @@ BakeRecord cancelled(const char* finding) {
   record.verdict = Verdict::kCancelled;
   record.error = Error{Status::kCancelled, finding, ""};
   return record;
+}
+
+/// 0: none.
+std::uint64_t memory_limit_bytes(const AssetOptions& options) {
+  if (options.memory_bytes != kMemoryOfTheMachine) return options.memory_bytes;
+  return may_bound_memory() ? physical_memory_bytes() : 0;
 }
 
 }  // namespace
@@ -148,7 +155,8 @@ void BakeRun::start_workers(WorkerProcesses& workers) {
     running.is_fallback = attempt.is_fallback;
     // The settings were checked when the jobs were listed.
     const AssetOptions options = options_from(texts_of(list_.jobs[attempt.index].settings)).value();
-    workers.start(attempt.index, bake_job(attempt, threads), {options.timeout_s, options.memory_bytes});
+    workers.start(attempt.index, bake_job(attempt, threads),
+                  {options.timeout_s, memory_limit_bytes(options)});
   }
 }
 

@@ -12,6 +12,7 @@
 #include "sqmap/bake/mesh.hpp"
 
 #include "../common/choices.hpp"
+#include "../common/confinement.hpp"
 #include "../common/json_text.hpp"
 #include "commands.hpp"
 #include "mesh_size.hpp"
@@ -98,7 +99,12 @@ std::function<Exit(Console&)> declare_check(CLI::App& app) {
   add_setting_options(app, kMeshSettings, args->settings);
   add_words(app, "--format", args->format, {"text", "json"}, "text or json (default text)")
       ->type_name("FORMAT");
-  return [args](Console& console) { return run_check(console, *args); };
+  return [args](Console& console) {
+    return run_confined(console, {{.heap_bytes = physical_memory_bytes(), .may_start_threads = true},
+                                  args->input.string(),
+                                  "report this with the mesh",
+                                  [&](Console& child) { return run_check(child, *args); }});
+  };
 }
 
 }  // namespace sqmap::apps

@@ -114,12 +114,12 @@ Outcome apply_timeout(AssetOptions& options, std::string_view text) {
 }
 
 Outcome apply_memory(AssetOptions& options, std::string_view text) {
-  if (text == "none") {
-    options.memory_bytes = 0;
+  if (text == "none" || text == "machine") {
+    options.memory_bytes = text == "none" ? 0 : kMemoryOfTheMachine;
     return Done{};
   }
   const Result<std::uint64_t> bytes = parse_bytes(text);
-  if (!bytes) return Error{Status::kBadOption, bytes.error().finding + ", or none", ""};
+  if (!bytes) return Error{Status::kBadOption, bytes.error().finding + ", or machine, or none", ""};
   if (bytes.value() < kLeastMemory_bytes)
     return Error{Status::kBadOption,
                  fmt::format("`{}`, must be at least 16M: a worker needs more by itself", text), ""};
@@ -149,7 +149,7 @@ std::string default_max_parts() { return max_parts_text(kDefaults.bake); }
 std::string default_max_bytes() { return max_bytes_text(kDefaults.bake); }
 std::string default_conservative() { return name_of<bool>(kDefaults.bake.conservative, kSwitchNames); }
 std::string default_timeout() { return fmt::format("{}s", kDefaults.timeout_s); }
-std::string default_memory() { return "none"; }
+std::string default_memory() { return "machine"; }
 std::string default_fallback() { return name_of<Fallback>(kDefaults.fallback, kFallbackNames); }
 
 constexpr std::array<Setting, 11> kSettings{{
@@ -175,8 +175,10 @@ constexpr std::array<Setting, 11> kSettings{{
      default_conservative, apply_conservative},
     {"timeout", "TIME", "End the bake of a mesh after this time: 90s, 5m, 2h or none", default_timeout,
      apply_timeout},
-    {"memory", "BYTES", "Memory (heap) that the bake of a mesh may take, e.g. 2G, or none", default_memory,
-     apply_memory},
+    {"memory", "BYTES",
+     "Memory (heap) that the bake of a mesh may take: e.g. 2G; machine: as much as the\nmachine has, which "
+     "stops what could never fit; or none",
+     default_memory, apply_memory},
     {"fallback", "KIND",
      "For a mesh that ran into a limit, crashed or could not be baked:\nnone, or superquadric: bake one for "
      "the "

@@ -20,11 +20,14 @@ namespace sqmap::apps {
 /// What to write where a mesh cannot be baked as asked.
 enum class Fallback { kNone, kSuperquadric };
 
+/// Stands for as many bytes as the machine has.
+inline constexpr std::uint64_t kMemoryOfTheMachine = ~std::uint64_t{0};
+
 /// Everything that can be chosen for one mesh.
 struct AssetOptions {
   bake::BakeOptions bake;
-  double timeout_s = 900;          ///< of one worker; 0: none
-  std::uint64_t memory_bytes = 0;  ///< of one worker; 0: no limit
+  double timeout_s = 900;                            ///< of one worker; 0: none
+  std::uint64_t memory_bytes = kMemoryOfTheMachine;  ///< of one worker; 0: no limit
   Fallback fallback = Fallback::kNone;
 };
 

@@ -15,6 +15,7 @@
 #include <sys/resource.h>
 #include <unistd.h>
 
+#include "../common/confinement.hpp"
 #include "worker_messages.hpp"
 
 namespace sqmap::apps {
@@ -84,6 +85,9 @@ int run_worker(const char* mesh) {
   no_core_dump();
   if (job.memory_bytes > 0 && !limit_memory(job.memory_bytes, job.bake.threads))
     return static_cast<int>(Exit::kInternal);
+  // Parsers of a dozen formats are about to read a file of who knows whom. Where the system has no such
+  // filter the bake goes on without.
+  deny_system_calls(true);
   std::set_new_handler(on_exhausted_memory);
   job.bake.input = mesh;
 

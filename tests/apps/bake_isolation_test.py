@@ -3,6 +3,7 @@
 stay; limits end it; the records say how it ended; nothing is left behind."""
 import json
 import os
+import re
 import shutil
 import signal
 import subprocess
@@ -132,6 +133,27 @@ class Isolation(FolderTest):
         for threads in ("-j1", "-j32"):
             self.assert_exit(run("sqbake", "bake", source, *ROUGH, "-o", self.folder / "box.h5", "--memory", "48M", threads,
                                  "--no-cache"), 0)
+
+    def test_a_worker_may_not_start_programs_nor_take_more_memory_than_the_machine_has(self):
+        write_off(self.models / "b.off", bent(5, 1))
+        process = self.start(self.models / "b.off", "-o", self.folder / "b.h5", "-j1")
+        worker = Path(f"/proc/{until(lambda: self.worker_on(process, 'b.off'))}")
+        until(lambda: "Seccomp:\t2" in (worker / "status").read_text(encoding="ascii"))
+        if not IS_ASAN:
+            limit = re.search(r"Max data size +(\d+) ", (worker / "limits").read_text(encoding="ascii"))
+            self.assertIsNotNone(limit)
+            machine = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+            self.assertGreaterEqual(int(limit[1]), machine)
+            self.assertLess(int(limit[1]), 1.1 * machine)
+        process.kill()
+
+    def test_memory_without_a_limit_has_none(self):
+        write_off(self.models / "b.off", bent(5, 1))
+        process = self.start(self.models / "b.off", "-o", self.folder / "b.h5", "-j1", "--memory", "none")
+        worker = Path(f"/proc/{until(lambda: self.worker_on(process, 'b.off'))}")
+        until(lambda: "Seccomp:\t2" in (worker / "status").read_text(encoding="ascii"))
+        self.assertRegex((worker / "limits").read_text(encoding="ascii"), r"Max data size +unlimited ")
+        process.kill()
 
     def test_workers_end_with_a_parent_that_is_killed_and_leave_no_file(self):
         write_off(self.models / "a.off", bent(5, 1))

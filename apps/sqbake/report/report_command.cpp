@@ -7,6 +7,7 @@
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
+#include "../../common/confinement.hpp"
 #include "../../common/files.hpp"
 #include "../commands.hpp"
 #include "../overwrite.hpp"
@@ -80,7 +81,12 @@ std::function<Exit(Console&)> declare_report(CLI::App& app) {
                  fmt::format("Draw at most so many assets, the worst and slowest first\n(default {})",
                              ReportOptions{}.picture_count))
       ->type_name("COUNT");
-  return [args](Console& console) { return run_report(console, *args); };
+  return [args](Console& console) {
+    return run_confined(console, {{.heap_bytes = physical_memory_bytes(), .may_start_threads = true},
+                                  args->records.front().string(),
+                                  "report this with the records and the bundles that they name",
+                                  [&](Console& child) { return run_report(child, *args); }});
+  };
 }
 
 }  // namespace sqmap::apps
