@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "determinism.hpp"
+#include "../../apps/sqbake/determinism.hpp"
 
 #include <string>
 #include <vector>

@@ -67,11 +67,14 @@ THIRD_PARTY = {
                           "apps/sqbake/cache/content_hash.cpp", "tests/formats/bundle_bytes.cpp"]),
     "JSON": (("nlohmann/",), ["apps/*.cpp", "apps/common/json_text.hpp", "libbake/src/options.cpp"]),
     "toml++": (("toml++/",), ["apps/sqbake/toml_files.cpp"]),
-    "CLI11, fmt": (("CLI/", "fmt/"), ["apps/*.cpp"]),
-    "Bullet": (("Bullet", "LinearMath/", "btBullet"), ["apps/sqsim/cloth.cpp", "apps/sqbench/peer_gimpact.cpp", VERSIONS]),
+    "CLI11, fmt": (("CLI/", "fmt/"), ["apps/*.cpp", "apps/common/choices.hpp"]),
+    "Bullet": (("Bullet", "LinearMath/", "btBullet"), ["apps/sqsim/cloth.cpp", "apps/sqbench/peer_gimpact.cpp",
+                                                            "apps/sqbench/peer_hulls.cpp", VERSIONS]),
+    "HACD": (("HACD/",), ["apps/sqbench/peer_hulls.cpp"]),
+    "NanoVDB": (("nanovdb/",), ["apps/sqbench/peer_nanovdb.cpp"]),
     "libpng": (("png.h",), ["apps/common/png_bytes.cpp"]),
-    "RapidCheck": (("rapidcheck/",), ["tests/runtime/property_test.cpp", "tests/hard/property_test.cpp"]),
-    "GoogleTest": (("gtest/", "gmock/"), ["tests/*_test.cpp"]),
+    "RapidCheck": (("rapidcheck/",), ["tests/*/*_test.cpp", "tests/support/branches.hpp"]),
+    "GoogleTest": (("gtest/", "gmock/"), ["tests/*_test.cpp", "tests/support/branches.hpp"]),
 }
 # The system's own interface; files, signals and terminals. None in a public header.
 POSIX = re.compile(r"((sys|linux)/\w+|unistd|fcntl|poll|sched|spawn|malloc)\.h$")
