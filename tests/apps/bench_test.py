@@ -416,6 +416,28 @@ class Table(SmokeRun):
         self.assertEqual(page.read_text(encoding="utf-8"), "no marks")
 
 
+class ReadmeTable(unittest.TestCase):
+    """The numbers of the README are those of the results in the repository."""
+
+    RESULTS = ROOT / "results" / "bench.json"
+
+    def test_readme_holds_the_table_of_the_results(self):
+        made = subprocess.run([sys.executable, "-B", TABLE, self.RESULTS], capture_output=True, text=True, check=True)
+        readme = (ROOT / "README.md").read_text(encoding="utf-8")
+        shown = readme.split("<!-- bench_table -->\n")[1].split("<!-- /bench_table -->")[0]
+        self.assertEqual(shown, made.stdout)
+
+    def test_results_are_a_whole_run_over_six_models_and_fit_the_schema(self):
+        results = json.loads(self.RESULTS.read_text(encoding="utf-8"))
+        schema = json.loads(SCHEMA.read_text(encoding="utf-8"))
+        self.assertEqual(list(violations(results, schema, schema)), [])
+        self.assertEqual(len(results["models"]), 6)
+        self.assertFalse(results["smoke"])
+        self.assertTrue(all(check["holds"] for check in results["checks"]))
+        self.assertTrue(all(results[table] for table in schema["properties"]
+                            if schema["properties"][table].get("type") == "array"))
+
+
 class Refusals(FolderTest):
     def test_bundle_of_another_mesh_is_refused(self):
         self.bake(sphere(2), "ball", *ROUGH)
