@@ -12,9 +12,15 @@
 
 namespace sqmap::test {
 
+/// The surface in the maps of mixed_asset(). Two balls with a gap to one behind them: rays cross up to four
+/// times.
+inline const std::vector<Ball>& mixed_balls() {
+  static const std::vector<Ball> kBalls{{{-0.4, 0, 0}, 0.5}, {{0.4, 0.1, 0}, 0.45}, {{0.0, 0.1, 1.1}, 0.35}};
+  return kBalls;
+}
+
 inline Asset mixed_asset(std::uint32_t bits = 9) {
-  // Two balls with a gap to a shell behind them: rays cross up to four times.
-  const std::vector<Ball> balls{{{-0.4, 0, 0}, 0.5}, {{0.4, 0.1, 0}, 0.45}, {{0.0, 0.1, 1.1}, 0.35}};
+  const std::vector<Ball>& balls = mixed_balls();
   struct Shape {
     Superquadric shape;
     Pose pose;

@@ -1,0 +1,256 @@
+// SPDX-License-Identifier: Apache-2.0
+// Properties of the third layer where the surface is known exactly: balls that meet, and a box.
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "sqmap/runtime/force.hpp"
+#include "sqmap/runtime/instance.hpp"
+#include "sqmap/runtime/object.hpp"
+
+#include "hard/shells.hpp"
+#include "runtime/touch_shapes.hpp"
+#include "support/branches.hpp"
+#include "support/mixed_asset.hpp"
+#include "support/union_of_balls.hpp"
+
+namespace sqmap::runtime {
+namespace {
+
+const bool kIsSeeded = test::seed_rapidcheck("seed=2007 max_success=2000");
+
+using test::Branches;
+using test::check;
+using test::Nearest;
+using test::share;
+using test::vector;
+
+const std::vector<test::Ball> kTwoBalls{{{-0.5, 0, 0}, 0.8}, {{0.5, 0.1, 0}, 0.7}};
+const Vec3d kHalf{0.5, 0.4, 0.3};
+
+/// An object whose surface is known.
+struct Known {
+  Object object;
+  Nearest (*nearest)(const Vec3d&);
+  Vec3d (*crease)();  ///< a random point of its edges or seams
+  Vec3d reach_m;
+};
+const Known& two_balls() {
+  static const Known kKnown{std::move(Object::build(test::two_balls(kTwoBalls, 65, 128))).value(),
+                            [](const Vec3d& p) { return test::nearest_of_union(kTwoBalls, p); },
+                            [] {
+                              // Of a point far off the axis, inside the groove, the seam is the nearest.
+                              const double turn = 3.14159265358979 * share();
+                              const Vec3d off{0, 0.3 * std::cos(turn), 0.3 * std::sin(turn)};
+                              return test::nearest_of_union(kTwoBalls, Vec3d{0.07, 0.05, 0} + off).point_m;
+                            },
+                            {1.35, 0.85, 0.85}};
+  return kKnown;
+}
+const Known& box() {
+  static const Known kKnown{std::move(Object::build(test::box_asset(kHalf))).value(),
+                            [](const Vec3d& p) { return test::nearest_of_box(kHalf, p); },
+                            [] {
+                              const int along = *rc::gen::inRange(0, 3);
+                              Vec3d p = vector();
+                              for (int axis = 0; axis < 3; ++axis)
+                                p[axis] = axis == along ? p[axis] * kHalf[axis]
+                                                        : std::copysign(kHalf[axis], p[axis]);
+                              return p;
+                            },
+                            {0.56, 0.45, 0.34}};
+  return kKnown;
+}
+const Known& mixed() {
+  static const Known kKnown{std::move(Object::build(test::mixed_asset())).value(),
+                            [](const Vec3d& p) { return test::nearest_of_union(test::mixed_balls(), p); },
+                            nullptr,
+                            {0.9, 0.5, 1.4}};
+  return kKnown;
+}
+
+Vec3d somewhere(const Known& known) {
+  const Vec3d v = vector();
+  return {known.reach_m.x * v.x, known.reach_m.y * v.y, known.reach_m.z * v.z};
+}
+
+struct FootLimits {
+  double flat_m;      ///< off the surface, but for `flat_share` of the flat places
+  double flat_share;  ///< of feet beside a crease that another chart answered
+  double crease_m;    ///< error of the distance to a crease
+  double surface_m;   ///< of surface_m off the surface
+};
+
+/// p - d n lies on the surface where that is smooth. Nearest to a crease the normal is that of one of its
+/// sides, so p - d n is off by up to |d|; there surface_m is claimed instead, and the distance.
+void feet_lie_on(const Known& known, const FootLimits& limits, const std::vector<std::string>& classes) {
+  Branches branches;
+  check([&] {
+    const bool by_crease = *rc::gen::arbitrary<bool>();
+    const Vec3d p = by_crease ? known.crease() + 0.08 * vector() : somewhere(known);
+    const Nearest exact = known.nearest(p);
+    RC_PRE(std::abs(exact.signed_distance_m) < 0.12);
+    const Answer answer = known.object.query(cast<float>(p), {Layer::kThree});
+    if (!std::isfinite(answer.signed_distance_m)) {
+      RC_ASSERT(exact.signed_distance_m > -5e-3);  // inside there is always a distance
+      return branches.take("no distance");
+    }
+    const auto d = static_cast<double>(answer.signed_distance_m);
+    const std::string side = exact.signed_distance_m < 0 ? ", inside" : ", outside";
+    if (std::abs(known.nearest(cast<double>(answer.surface_m)).signed_distance_m) > limits.surface_m)
+      branches.take("surface_m off");
+    const double off_m = std::abs(known.nearest(p - d * cast<double>(answer.normal)).signed_distance_m);
+    if (exact.is_crease) {
+      branches.take("crease" + side);
+      RC_ASSERT(off_m <= std::abs(d) + limits.surface_m);
+      if (std::abs(d - exact.signed_distance_m) > limits.crease_m) branches.take("crease, wrong distance");
+      return;
+    }
+    branches.take("flat");
+    branches.take("flat" + side);
+    if (off_m > limits.flat_m) branches.take("flat, off");
+  });
+  branches.expect(classes, 50);
+  const int all =
+      branches.count("flat") + branches.count("crease, inside") + branches.count("crease, outside");
+  branches.expect_at_most("flat, off", static_cast<int>(limits.flat_share * branches.count("flat")));
+  branches.expect_at_most("crease, wrong distance",
+                          (branches.count("crease, inside") + branches.count("crease, outside")) / 50);
+  branches.expect_at_most("surface_m off", all * 3 / 100);
+  for (const char* name : {"flat", "flat, off", "crease, wrong distance", "surface_m off", "no distance",
+                           "crease, inside", "crease, outside"})
+    testing::Test::RecordProperty(name, branches.count(name));
+}
+
+TEST(Foot, OfTwoBallsLiesOnTheSurfaceButAtTheSeam) {
+  feet_lie_on(two_balls(), {2e-3, 0.08, 0.04, 2e-3}, {"flat, inside", "flat, outside", "crease, inside"});
+}
+TEST(Foot, OfABoxLiesOnTheSurfaceButAtEdges) {
+  feet_lie_on(box(), {2e-3, 0.01, 5e-3, 3e-3}, {"flat, inside", "flat, outside", "crease, outside"});
+}
+
+/// Between two places, the force on a spring of 1 N/m changes by no more than the step, the map's error and
+/// a turn of the normal from facet to facet, but where `part` or the nearest surface is another.
+void force_changes_slowly(const Known& known, double unexcused_share) {
+  Branches branches;
+  constexpr double kStep_m = 1e-3, kMapError_m = 1e-3, kTurn = 0.1;
+  check([&] {
+    Vec3d p = somewhere(known);
+    const Nearest start = known.nearest(p);
+    p = start.point_m + (0.03 * share()) * normalized(p - start.point_m);
+    const Vec3d along = normalized(vector() + Vec3d{0.01, 0, 0});
+    Answer before = known.object.query(cast<float>(p), {Layer::kThree});
+    Nearest was = known.nearest(p);
+    for (int k = 0; k < 40; ++k) {
+      p = p + kStep_m * normalized(along + 0.5 * Vec3d{std::sin(k), std::cos(2.0 * k), std::sin(3.0 * k)});
+      const Answer now = known.object.query(cast<float>(p), {Layer::kThree});
+      const Nearest is = known.nearest(p);
+      const Vec3f force_before = reaction_force(before, 1), force = reaction_force(now, 1);
+      const auto change = static_cast<double>(norm(force - force_before));
+      const auto depth_m = static_cast<double>(std::max(norm(force), norm(force_before)));
+      const bool is_other_part = now.part != before.part;
+      const bool is_ridge = is.is_crease || was.is_crease || norm(is.point_m - was.point_m) > 10 * kStep_m;
+      branches.take(!(depth_m > 0)            ? "free"
+                    : norm(force_before) == 0 ? "enters"
+                    : norm(force) == 0        ? "leaves"
+                                              : "in contact");
+      if (is_other_part) branches.take("another part");
+      if (is_ridge) branches.take("ridge");
+      if (change > 1.1 * kStep_m + kMapError_m + kTurn * depth_m)
+        branches.take(is_other_part ? "jump to another part"
+                      : is_ridge    ? "jump at a ridge"
+                                    : "jump without a flag");
+      before = now;
+      was = is;
+    }
+  });
+  branches.expect({"in contact", "enters", "leaves", "free"}, 200);
+  branches.expect({"another part", "ridge"}, 30);
+  branches.expect({"jump to another part", "jump at a ridge"}, 1);
+  const int steps = branches.count("in contact") + branches.count("enters") + branches.count("leaves");
+  branches.expect_at_most("jump without a flag", static_cast<int>(unexcused_share * steps));
+  branches.expect_at_most("jump to another part", branches.count("another part"));
+  branches.expect_at_most("jump at a ridge", branches.count("ridge") / 5);
+  for (const char* name : {"in contact", "another part", "ridge", "jump to another part", "jump at a ridge",
+                           "jump without a flag"})
+    testing::Test::RecordProperty(name, branches.count(name));
+}
+
+TEST(Force, OverTwoBallsJumpsHardlyButWherePartOrSurfaceIsAnother) {
+  force_changes_slowly(two_balls(), 0.002);
+}
+TEST(Force, OverAMixedAssetJumpsSeldomButWherePartOrSurfaceIsAnother) {
+  force_changes_slowly(mixed(), 0.025);
+}
+
+/// Rotation about a unit axis (Rodrigues), then the frame: shares nothing with the quaternions of the code.
+struct Motion {
+  Vec3d axis;
+  double angle, scale;
+  bool mirrored;
+  Vec3d translation_m;
+  Vec3d turned(Vec3d v) const {
+    if (mirrored) v.x = -v.x;
+    return std::cos(angle) * v + std::sin(angle) * cross(axis, v) +
+           (1 - std::cos(angle)) * dot(axis, v) * axis;
+  }
+  Vec3d moved(const Vec3d& p) const { return scale * turned(p) + translation_m; }
+  Placement placement() const {
+    const double s = std::sin(angle / 2);
+    return {{{std::cos(angle / 2), s * axis.x, s * axis.y, s * axis.z}, translation_m}, scale, mirrored};
+  }
+};
+
+TEST(Placed, AnswersOfAMixedAssetTurnMoveScaleAndMirrorWithIt) {
+  constexpr double kRest = 2e-3;  // layer 3 stops when a step is below a thirtieth of a cell; a place, in m
+  Branches branches;
+  check([&] {
+    const Vec3d axis = vector();
+    RC_PRE(norm(axis) > 0.1);
+    const double scale = std::pow(10.0, 3 * share());
+    const Motion motion{normalized(axis), 3.1 * share(), scale, *rc::gen::arbitrary<bool>(),
+                        (5 * scale) * vector()};
+    const Instance instance = Instance::place(mixed().object, motion.placement()).value();
+    const Vec3d p = somewhere(mixed());
+    const Answer object = mixed().object.query(cast<float>(p), {Layer::kThree}),
+                 world = instance.query(cast<float>(motion.moved(p)), {Layer::kThree});
+    // What a float of the world may be off by, in the object; where so small a step changes the answer, the
+    // two may differ.
+    const double step_m = 4e-7 * (norm(motion.translation_m) / scale + 4);
+    for (int i = 0; i < 6; ++i) {
+      Vec3d q = p;
+      q[i / 2] += (i % 2 == 0 ? 2 : -2) * step_m;
+      const Answer beside = mixed().object.query(cast<float>(q), {Layer::kThree});
+      if (beside.part != object.part || beside.inside != object.inside ||
+          !(norm(beside.surface_m - object.surface_m) < 1e-3F))
+        return branches.take("beside a jump");
+    }
+    branches.take("all");
+    RC_ASSERT(world.part == object.part);
+    RC_ASSERT(world.inside == object.inside);
+    RC_ASSERT(world.layer == object.layer);
+    RC_ASSERT(std::isnan(world.signed_distance_m) == std::isnan(object.signed_distance_m));
+    if (std::isnan(object.signed_distance_m)) return branches.take("no distance");
+    branches.take(motion.mirrored, "mirrored", "not mirrored");
+    branches.take(object.inside, "inside", "outside");
+    if (scale < 0.1) branches.take("scale < 0.1");
+    if (scale > 10) branches.take("scale > 10");
+    const auto d = static_cast<double>(object.signed_distance_m);
+    RC_ASSERT(std::abs(static_cast<double>(world.signed_distance_m) / scale - d) < 1e-6 + step_m);
+    RC_ASSERT(norm(cast<double>(world.surface_m) - motion.moved(cast<double>(object.surface_m))) / scale <
+              kRest);
+    // The facets of a fan or of neighbouring cells meet where the place is the same.
+    if (norm(cast<double>(world.normal) - motion.turned(cast<double>(object.normal))) > 2 * kRest)
+      branches.take("another facet");
+  });
+  branches.expect({"mirrored", "not mirrored", "inside", "outside", "scale < 0.1", "scale > 10"}, 100);
+  branches.expect_at_most("beside a jump", branches.count("all") / 50);
+  branches.expect_at_most("another facet", (branches.count("inside") + branches.count("outside")) / 50);
+  RecordProperty("beside_a_jump", branches.count("beside a jump"));
+  RecordProperty("another_facet", branches.count("another facet"));
+}
+
+}  // namespace
+}  // namespace sqmap::runtime
