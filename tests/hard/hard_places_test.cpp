@@ -144,26 +144,27 @@ TEST(NearSurface, PointsOneFloatOffKnowTheirDistanceSideAndNormal) {
           places.push_back({n, beta, kDepth_m - below, below_m > 0});
         }
     }
-    targets = test::for_each_target([&](SimdTarget) {
-      for (const Layer layer : {Layer::kTwo, Layer::kThree}) {
-        test::Batch batch(points.size());
-        object.query(points, batch.answers(), {layer});
-        for (std::size_t i = 0; i < points.size(); ++i) {
-          const Place& at = places[i];
-          SCOPED_TRACE(test::name_of(shape) + ", layer " + std::to_string(static_cast<int>(layer)));
-          if (batch.part[i] == kNowhere) {
-            ++nowhere;
-            ASSERT_GT(at.beta, 1 - 5e-7);  // as FirstLayer.ErrsOnlyWithinAFewFloatsOfTheSurface
-            continue;
+    targets =
+        test::for_each_target([&, &shape = shape, &most_m = most_m, &most_normal = most_normal](SimdTarget) {
+          for (const Layer layer : {Layer::kTwo, Layer::kThree}) {
+            test::Batch batch(points.size());
+            object.query(points, batch.answers(), {layer});
+            for (std::size_t i = 0; i < points.size(); ++i) {
+              const Place& at = places[i];
+              SCOPED_TRACE(test::name_of(shape) + ", layer " + std::to_string(static_cast<int>(layer)));
+              if (batch.part[i] == kNowhere) {
+                ++nowhere;
+                ASSERT_GT(at.beta, 1 - 5e-7);  // as FirstLayer.ErrsOnlyWithinAFewFloatsOfTheSurface
+                continue;
+              }
+              ASSERT_LT(at.beta, 1 + 5e-7);
+              (at.is_on_surface ? on_surface : on_superquadric)++;
+              ASSERT_NEAR(batch.distance_m[i], at.exact_m, most_m);
+              ASSERT_EQ(batch.inside[i] != 0, batch.distance_m[i] < 0);
+              ASSERT_LT(norm(cast<double>(batch.normal[i]) - at.outward), most_normal);
+            }
           }
-          ASSERT_LT(at.beta, 1 + 5e-7);
-          (at.is_on_surface ? on_surface : on_superquadric)++;
-          ASSERT_NEAR(batch.distance_m[i], at.exact_m, most_m);
-          ASSERT_EQ(batch.inside[i] != 0, batch.distance_m[i] < 0);
-          ASSERT_LT(norm(cast<double>(batch.normal[i]) - at.outward), most_normal);
-        }
-      }
-    });
+        });
   }
   EXPECT_GT(on_surface, 900 * targets);
   EXPECT_GT(on_superquadric, 400 * targets);
