@@ -148,7 +148,7 @@ HWY_NOINLINE void Answerer::second_layer() noexcept {
     const EntryRange& range = entries_.ranges[r];
     const PartRecord& part = resident_.part(range.part);
     const Chart chart(resident_, part, charts_.table(range.part));
-    const Looker looker(resident_, part, chart, options_.level);
+    const Looker looker(resident_, part, chart, options_);
     for (std::uint32_t i = range.begin; i < range.end; i += lane_count()) {
       const Look look = looker.look(load3(entries_.x, entries_.y, entries_.z, i),
                                     hn::FirstN(kD, range.end - i), wants_.reach);
@@ -158,6 +158,9 @@ HWY_NOINLINE void Answerer::second_layer() noexcept {
       hn::StoreU(look.distance, kD, entries_.distance + i);
       hn::StoreU(look.certainty, kD, entries_.certainty + i);
       hn::StoreU(look.flags, kDI, entries_.flags + i);
+      hn::StoreU(look.start, kDI, entries_.start + i);
+      hn::StoreU(look.foot_row, kD, entries_.other_row + i);
+      hn::StoreU(look.foot_col, kD, entries_.other_col + i);
     }
   }
 }
@@ -178,7 +181,7 @@ HWY_NOINLINE void Answerer::third_layer(const Chunk& chunk, bool is_whole) noexc
     const PartRecord& part = resident_.part(range.part);
     if (layer_for(part, options_) != Layer::kThree) continue;
     const Chart chart(resident_, part, charts_.table(range.part));
-    const Looker looker(resident_, part, chart, options_.level);
+    const Looker looker(resident_, part, chart, options_);
     Walker(looker, wants_, entries_).refine(range.begin, range.end, asked_);
   }
 }
@@ -239,7 +242,7 @@ HWY_NOINLINE void Answerer::mark_wanted(bool is_whole, Findings& findings) noexc
 HWY_NOINLINE void Answerer::place(const EntryRange& range) noexcept {
   const PartRecord& part = resident_.part(range.part);
   const Chart chart(resident_, part, charts_.table(range.part));
-  const Looker looker(resident_, part, chart, options_.level);
+  const Looker looker(resident_, part, chart, options_);
   const auto loaded = [](float(&values)[3][Entries::kLength], std::uint32_t i)
                           HWY_ATTR { return load3(values[0], values[1], values[2], i); };
   const auto store = [](const V3& v, float(&values)[3][Entries::kLength], std::uint32_t i) HWY_ATTR {
@@ -283,7 +286,7 @@ HWY_NOINLINE void Answerer::hand_over(Findings& findings) noexcept {
 }
 
 // What Object promises of the stack; the rest is a few vectors that did not fit registers.
-static_assert(sizeof(Answerer) + sizeof(Walker) + sizeof(Chunk) + sizeof(Findings) + sizeof(Lost) <=
+static_assert(sizeof(Answerer) + sizeof(Walker) + sizeof(Chunk) + sizeof(Findings) + sizeof(Remote) <=
               std::size_t{384} * 1024);
 
 /// Default answers.

@@ -40,24 +40,13 @@ inline constexpr float kLeastDoubt = 1e-6F;  ///< of the part's sphere
 inline constexpr float kBesidePole =
     0.05F;  ///< cells: on a pole the columns have no length, and no direction
 inline constexpr int kThirdLayerSteps =
-    8;  ///< Gauss-Newton converges in one or two; the rest crosses cells and creases
+    5;  ///< Gauss-Newton converges in one or two; the rest crosses cells and creases
 inline constexpr float kMostCells = 2;     ///< of one such step
 inline constexpr float kBackStep = 0.35F;  ///< what is kept of a step that leads farther from the point
 inline constexpr float kLeastAngle =
     1e-6F;  ///< squared sine between rows and columns, below which one is a pole
-/// Cells: shorter steps end the search. On the sample meshes 0.001 finds the same distances to 1e-7 of R_max.
+/// Cells: shorter steps end the search.
 inline constexpr float kLeastCellStep = 0.03F;
-/// Eight cells around a place on each of some rings, at doubling distances, in which layer 3 looks for
-/// another start.
-struct Rings {
-  int first, end;   ///< ring r lies 2^r cells away
-  bool is_for_any;  ///< a ring with a patch is the last one
-};
-inline constexpr Rings kBeside{0, 5, true};      ///< when the foot's own cell bounds no patch
-inline constexpr Rings kElsewhere{1, 5, false};  ///< when the surface that was found lies far off
-/// A start elsewhere must be nearer than the surface that was found by this factor.
-inline constexpr float kNearer = 0.9F;
-
 /// Layer 1: F(p) <= 1 (FORMAT.md S1), from powers of the unit coordinates.
 inline bool in_superquadric(const PartRecord& part, const Vec3f& p) noexcept {
   const float x = std::abs(p.x) * part.inverse_axes.x, y = std::abs(p.y) * part.inverse_axes.y,
@@ -97,10 +86,8 @@ class Chart {
 
   /// Layers 2 and 3 for a point inside the superquadric. edge > 0: also the offset for faces with such edges.
   ChartAnswer look(const Vec3f& p, bool third, std::uint32_t level, float edge) const noexcept;
-  /// The centre of the cell nearest to p, of those on `rings` around (row, col) that bound a patch nearer
-  /// than the square root of `within_square`. False: none.
-  bool nearest_start(const Vec3f& p, std::uint32_t stride, const Rings& rings, float within_square,
-                     float& row, float& col) const noexcept;
+  /// The represented surface at a place of level 0. False: its cell bounds no patch.
+  bool patch_point(float row, float col, Vec3f& point) const noexcept;
   /// Beyond this distance, about a cell, a walk may have ended on the wrong surface.
   static float far_from(const PartRecord& part, std::uint32_t stride) noexcept {
     return part.sphere_radius * (2 * static_cast<float>(stride) / static_cast<float>(part.rows));
@@ -117,12 +104,19 @@ class Chart {
     bool starts[4];
     bool eligible;  // four corners hit the mesh from outside it
   };
+  /// Where a search may begin, and how far from the point that is.
+  struct Start {
+    float row = 0, col = 0, square = std::numeric_limits<float>::infinity();  ///< infinite: it may not
+  };
   /// The represented surface r - D n (paper eq. 22) at one place, with its derivatives.
   struct Patch {
     Vec3f point, row, col;
   };
 
   Cell cell_at(float row, float col, std::uint32_t stride) const noexcept;
+  Start start_at(const Vec3f& p, float row, float col, std::uint32_t stride) const noexcept;
+  /// In the nearest of the eight cells around that of (row, col).
+  Start start_beside(const Vec3f& p, float row, float col, std::uint32_t stride) const noexcept;
   Patch patch_at(const Cell& cell, float row, float col, std::uint32_t stride) const noexcept;
   /// Outward unit normal of the represented surface at (row, col) of the cell.
   Vec3f patch_normal(const Cell& cell, float row, float col, std::uint32_t stride) const noexcept {
@@ -192,24 +186,30 @@ inline ChartAnswer Chart::look(const Vec3f& p, bool third, std::uint32_t level, 
   const Foot<float> foot = table_.foot(p);
   ChartAnswer answer = second_layer(p, foot, stride);
   if (third) {
-    ChartAnswer refined = answer;
-    // An inner point needs a distance, or it would feel no force.
-    if (answer.bounds_patch ||
-        (answer.inside && nearest_start(p, stride, kBeside, std::numeric_limits<float>::infinity(),
-                                        refined.row, refined.col))) {
-      third_layer(p, stride, refined);
+    // The search goes downhill only, so it begins where it is nearer. Points outside the mesh, the most of
+    // those that touch nothing, do with the foot; an inner point needs a distance, or it would feel no force.
+    Start first, other;
+    if (answer.bounds_patch) first = start_at(p, foot.row, foot.col, stride);
+    if (answer.inside) {
+      if (!answer.bounds_patch) first = start_beside(p, foot.row, foot.col, stride);
+      const std::uint32_t named = resident_.start(part_, foot.row, foot.col, foot.depth_m);
+      if (named != StartTable::kNone)
+        other = start_at(p, part_.starts.place(named >> 8U), part_.starts.place(named & 255U), stride);
+      if (other.square < first.square) std::swap(first, other);
     }
-    // A crossing that is on no patch stands where it is nearer.
-    if (!answer.has_point || refined.distance < answer.distance) answer = refined;
-    // The walk goes downhill only: where the surface is far, another hillside may be nearer. Points outside
-    // the mesh, the most of those that touch nothing, do without.
-    if (answer.inside && std::isfinite(answer.distance) && answer.distance > far_from(part_, stride)) {
-      const float within = kNearer * answer.distance;
-      refined = answer;
-      if (nearest_start(p, stride, kElsewhere, within * within, refined.row, refined.col)) {
-        third_layer(p, stride, refined);
-        if (refined.distance < answer.distance) answer = refined;
-      }
+    ChartAnswer refined = answer;
+    if (std::isfinite(first.square)) {
+      refined.row = first.row;
+      refined.col = first.col;
+      third_layer(p, stride, refined);
+      // A crossing that is on no patch stands where it is nearer.
+      if (!answer.has_point || refined.distance < answer.distance) answer = refined;
+    }
+    if (std::isfinite(other.square) && answer.distance > far_from(part_, stride)) {
+      refined.row = other.row;
+      refined.col = other.col;
+      third_layer(p, stride, refined);
+      if (refined.distance < answer.distance) answer = refined;
     }
   }
   if (edge > 0 && std::isfinite(answer.distance)) answer.offset = offset(answer.row, answer.col, level, edge);
@@ -322,37 +322,40 @@ inline ChartAnswer Chart::second_layer(const Vec3f& p, const Foot<float>& foot,
   return answer;
 }
 
-inline bool Chart::nearest_start(const Vec3f& p, std::uint32_t stride, const Rings& rings,
-                                 float within_square, float& row, float& col) const noexcept {
-  const auto turn = static_cast<float>(part_.cols);
-  const float half = static_cast<float>(stride) / 2, last = static_cast<float>(part_.rows - 1) - half;
+inline bool Chart::patch_point(float row, float col, Vec3f& point) const noexcept {
+  const Cell cell = cell_at(row, col, 1);
+  if (cell.eligible) point = patch_at(cell, row, col, 1).point;
+  return cell.eligible;
+}
+
+inline Chart::Start Chart::start_at(const Vec3f& p, float row, float col,
+                                    std::uint32_t stride) const noexcept {
+  Start start{row, col, std::numeric_limits<float>::infinity()};
+  const Cell cell = cell_at(row, col, stride);
+  if (!cell.eligible) return start;
+  const Vec3f error = p - patch_at(cell, row, col, stride).point;
+  start.square = dot(error, error);
+  return start;
+}
+
+inline Chart::Start Chart::start_beside(const Vec3f& p, float row, float col,
+                                        std::uint32_t stride) const noexcept {
+  const auto size = static_cast<float>(stride), turn = static_cast<float>(part_.cols);
   const Cell middle = cell_at(row, col, stride);
-  const float mid_row = static_cast<float>(middle.row) + half,
-              mid_col = static_cast<float>(middle.col) + half;
-  float best_square = within_square;
-  bool found = false;
-  for (int ring = rings.first; ring < rings.end && !(found && rings.is_for_any); ++ring) {
-    const auto step = static_cast<float>(stride << ring);
-    for (int k = 0; k < 9; ++k) {
-      if (k == 4) continue;  // the middle
-      const int rows_up = k / 3 - 1;
-      const float here_row = mid_row + static_cast<float>(rows_up) * step;
-      float here_col = mid_col + static_cast<float>(k % 3 - 1) * step;
-      if (here_row < half || here_row > last) continue;
-      here_col = here_col < 0 ? here_col + turn : here_col;
-      here_col = here_col < turn ? here_col : here_col - turn;
-      if (!(here_col >= 0 && here_col < turn)) continue;  // a ring wider than the map
-      const Cell cell = cell_at(here_row, here_col, stride);
-      if (!cell.eligible) continue;
-      const Vec3f d = p - patch_at(cell, here_row, here_col, stride).point;
-      if (!(dot(d, d) < best_square)) continue;
-      best_square = dot(d, d);
-      row = here_row;
-      col = here_col;
-      found = true;
-    }
+  const float mid_row = static_cast<float>(middle.row) + size / 2,
+              mid_col = static_cast<float>(middle.col) + size / 2;
+  Start best;
+  for (int k = 0; k < 9; ++k) {
+    if (k == 4) continue;  // the middle
+    const float here_row = mid_row + static_cast<float>(k / 3 - 1) * size;
+    float here_col = mid_col + static_cast<float>(k % 3 - 1) * size;
+    here_col = here_col < 0 ? here_col + turn : here_col;
+    here_col = here_col < turn ? here_col : here_col - turn;
+    if (!(here_row > 0 && here_row < static_cast<float>(part_.rows - 1))) continue;
+    const Start start = start_at(p, here_row, here_col, stride);
+    if (start.square < best.square) best = start;
   }
-  return found;
+  return best;
 }
 
 inline void Chart::step_towards(const Patch& patch, const Vec3f& error, std::uint32_t stride, float& d_row,

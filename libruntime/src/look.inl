@@ -5,8 +5,8 @@
 
 /// What layer 2 knows of the lanes of one vector.
 struct Look {
-  V row, col, crossing, distance, certainty;
-  VI flags;
+  V row, col, crossing, distance, certainty, foot_row, foot_col;
+  VI flags, start;
 };
 
 struct VCell {
@@ -22,14 +22,16 @@ struct VPatch {
   V3 point, row, col;
 };
 
-/// One part at one level, with what every step of a look needs of it.
+/// One part at one layer and level, with what every step of a look needs of it.
 class Looker {
  public:
-  Looker(const Resident& resident, const PartRecord& part, const Chart& chart, std::uint32_t level) noexcept
+  Looker(const Resident& resident, const PartRecord& part, const Chart& chart,
+         const QueryOptions& options) noexcept
       : resident_(resident),
         part_(part),
         chart_(chart),
-        stride_(part.stride_at(level)),
+        stride_(part.stride_at(options.level)),
+        third_(layer_for(part, options) == Layer::kThree),
         last_row_(static_cast<float>(part.rows - 1)),
         turn_(static_cast<float>(part.cols)),
         size_(static_cast<float>(stride_)),
@@ -37,6 +39,12 @@ class Looker {
 
   /// Layer 2. Wants::reach decides about kWithin.
   SQMAP_KERNEL Look look(const V3& p, M wanted, float reach) const noexcept;
+  /// StartTable::place.
+  HWY_INLINE V start_place(VI k) const noexcept {
+    const StartTable& starts = part_.starts;
+    const VI first = hn::ShiftLeftSame(k, starts.step_shift) + all_int((1U << starts.step_shift) / 2);
+    return to_float(first) + all(0.5F);
+  }
   /// Where layer 2 says the surface is, and its normal there.
   HWY_INLINE V3 surface_at(V row, V col, V crossing) const noexcept {
     const Sample r = sample_at(chart_.table(), row, col);
@@ -135,6 +143,19 @@ class Looker {
   float turn() const noexcept { return turn_; }
 
  private:
+  /// Resident::start.
+  HWY_INLINE VI start_of(V row, V col, V depth) const noexcept {
+    const StartTable& starts = part_.starts;
+    const V zero = hn::Zero(kD);
+    const VI cell_row = hn::Min(to_int(most(row, zero)), all_int(part_.rows - 1));
+    const VI cell_col = hn::Min(to_int(most(col, zero)), all_int(part_.cols - 1));
+    const VI tile = hn::ShiftRightSame(cell_row, starts.tile_shift) * all_int(starts.tile_cols) +
+                    hn::ShiftRightSame(cell_col, starts.tile_shift);
+    const V level = limited(depth * all(starts.depths_per_unit), zero, all(StartTable::kDepths - 1.0F));
+    const VI place = tile * all_int(StartTable::kDepths) + to_int(level);
+    const VU word = gather_bytes(resident_.bytes() + starts.at, hn::ShiftLeft<1>(place));
+    return hn::BitCast(kDI, hn::And(word, hn::Set(kDU, 0xFFFFU)));
+  }
   HWY_NOINLINE void further_sheets(M lanes, VI texel, V shift, V depth, V& gap, V& crossing, V& inside,
                                    V& leaving, V& later) const noexcept;
 
@@ -142,6 +163,7 @@ class Looker {
   const PartRecord& part_;
   const Chart& chart_;
   std::uint32_t stride_;
+  bool third_;
   float last_row_, turn_, size_, inverse_size_;
 };
 
@@ -188,8 +210,8 @@ SQMAP_KERNEL Look Looker::look(const V3& p, M wanted, float reach) const noexcep
     }
   }
   Look look;
-  look.row = foot.row;
-  look.col = foot.col;
+  look.row = look.foot_row = foot.row;
+  look.col = look.foot_col = foot.col;
   look.crossing = crossing;
   look.distance = pick(corners.eligible, gap, all(std::numeric_limits<float>::infinity()));
   // No patch, but a point of the surface: where the ray of the nearest texel crosses it.
@@ -211,6 +233,9 @@ SQMAP_KERNEL Look Looker::look(const V3& p, M wanted, float reach) const noexcep
                       hn::Or(flag(leaves, kLeaving), flag(corners.eligible, kPatch)));
   if (reach > 0)
     look.flags = hn::Or(look.flags, flag(hn::Lt(all(part_.depth_min) - foot.depth, all(reach)), kWithin));
+  look.start = all_int(StartTable::kNone);
+  const M inner = hn::And(inside, wanted);
+  if (third_ && !none(inner)) look.start = pick(inner, start_of(foot.row, foot.col, foot.depth), look.start);
   const V sure = pick(as_float(mixed), most(foot.depth, zero), all(part_.sphere_radius));
   look.certainty = least(gap, sure) / most(doubt, all(kLeastDoubt * part_.sphere_radius));
   return look;

@@ -183,6 +183,11 @@ PartRecord put_part(Layout& out, const Part& part, double units_per_m) {
   record.bound_cells = static_cast<std::uint8_t>(part.bounds.cells);
   out.put(part.bounds.cell.data(), part.bounds.cell.size() * sizeof(BoundCell));
 
+  record.starts = StartTable::of(record.rows, record.cols, record.semi_axes);
+  record.starts.at = out.at();
+  const std::vector<std::uint8_t> no_starts(record.starts.bytes(), 0xFF);
+  out.put(no_starts.data(), no_starts.size());
+
   record.texels_at = out.at();
   BitPacker packer(out);
   for (std::uint32_t k = 0; k < map.code.size(); ++k) {
@@ -256,6 +261,7 @@ Resident::Resident(const Asset& asset) : part_count_(static_cast<std::uint32_t>(
   bytes_ = std::make_unique<std::uint8_t[]>(size_);
   Layout out(bytes_.get());
   lay_out(out);
+  for (std::uint32_t k = 0; k < part_count_; ++k) fill_starts(part(k));
 }
 
 std::uint32_t Resident::find(const SideList& list, std::uint32_t key_wanted) const noexcept {

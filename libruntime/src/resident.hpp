@@ -4,14 +4,15 @@
 // object's radius: products of four lengths then neither overflow nor vanish, and changing units rounds
 // nothing. One allocation of
 //
-//     PartRecord[parts] | part 0: curves | bounds | texels | sheet blocks | sheets | fan blocks | fans | part
-//     1: ... | 4 bytes
+//     PartRecord[parts] | part 0: curves | bounds | starts | texels | sheet blocks | sheets | fan blocks |
+//     fans | part 1: ... | 4 bytes
 //
 //     curves   eta and omega as CurveTable, 16 bits a number: how far c falls and s rises over each cell
 //     (their sums
 //              then err by half a unit, and differences of neighbours, which make the second derivatives,
 //              hardly more), and the steps at the nodes
 //     bounds   BoundCell[6 bound_cells^2], where the asset has bounds
+//     starts   StartTable: where layer 3 may begin, 16 bits for each of kDepths depths below each tile
 //     texels   one a node, row-major, `texel_bits` each, least significant bit first: the depth code and,
 //     where
 //              the part has a seam, above it the bit that the node starts inside the mesh
@@ -20,6 +21,7 @@
 //     blocks   one bit for each kBlock texels: a list holds one of them. Absent where the list is empty.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
@@ -54,6 +56,28 @@ struct Slabs {
   static Slabs of(const Vec3f& inverse_axes, double e1, double e2) noexcept;
 };
 
+/// Where a search for the nearest point of the represented surface may begin, besides the foot. Tiles of the
+/// map, and the depths below each of them, are boxes of the superquadric's inside; each names the cell of the
+/// map whose patch is nearest to its middle, among those of a coarser grid, as row << 8 | column of that
+/// grid. Filled by fill_starts() from the maps; not part of the asset.
+struct StartTable {
+  static constexpr std::uint32_t kDepths = 4;
+  static constexpr std::uint16_t kNone = 0xFFFF;  ///< the part has no patch
+
+  std::uint32_t at{};  ///< byte offset
+  std::uint32_t tile_rows{}, tile_cols{};
+  std::uint8_t tile_shift{};  ///< log2 of a tile's side [cells]
+  std::uint8_t step_shift{};  ///< log2 of the coarser grid's spacing [cells]
+  float depths_per_unit{};
+
+  static StartTable of(std::uint32_t rows, std::uint32_t cols, const Vec3f& semi_axes) noexcept;
+  std::size_t bytes() const noexcept { return std::size_t{2} * kDepths * tile_rows * tile_cols; }
+  /// Of a row or column of the coarser grid: that of the middle of its cell in the map.
+  float place(std::uint32_t k) const noexcept {
+    return static_cast<float>((k << step_shift) + (1U << step_shift) / 2) + 0.5F;
+  }
+};
+
 /// One part. Lengths in units of Resident::unit_m; byte offsets count from the start of the allocation.
 struct PartRecord {
   Vec3f semi_axes, inverse_axes;
@@ -70,6 +94,7 @@ struct PartRecord {
   std::uint8_t level_count{}, code_bits{}, texel_bits{};
   std::uint8_t bound_cells{};  ///< a side of a face; 0: no bounds
   std::uint32_t curves_at{}, texels_at{};
+  StartTable starts;
   SideList sheets, fans;
 
   Vec3f to_part(const Vec3f& p) const noexcept { return object_from_part.apply_inverse(p - translation); }
@@ -118,6 +143,17 @@ class Resident {
     return load<BoundCell>(part.curves_at + kCurveBytes +
                            cell * static_cast<std::uint32_t>(sizeof(BoundCell)));
   }
+  /// StartTable: where to begin for a point at `depth` below (row, col), or kNone.
+  std::uint16_t start(const PartRecord& part, float row, float col, float depth) const noexcept {
+    const StartTable& starts = part.starts;
+    const std::uint32_t cell_row = std::min(static_cast<std::uint32_t>(greater(row, 0.0F)), part.rows - 1);
+    const std::uint32_t cell_col = std::min(static_cast<std::uint32_t>(greater(col, 0.0F)), part.cols - 1);
+    const std::uint32_t tile =
+        (cell_row >> starts.tile_shift) * starts.tile_cols + (cell_col >> starts.tile_shift);
+    const float level = lesser(greater(depth * starts.depths_per_unit, 0.0F), StartTable::kDepths - 1.0F);
+    return load<std::uint16_t>(starts.at +
+                               2 * (tile * StartTable::kDepths + static_cast<std::uint32_t>(level)));
+  }
   /// Position of the first entry of a list with key >= `key`, or `count`, without a search where its block is
   /// empty.
   std::uint32_t find(const SideList& list, std::uint32_t key) const noexcept;
@@ -138,6 +174,8 @@ class Resident {
   void unpack(const PartRecord& part, ShapeTable<float>& table) const noexcept;
 
  private:
+  /// Of one part whose texels are there.
+  void fill_starts(const PartRecord& part);
   template <class T>
   T load(std::uint32_t at) const noexcept {
     T value;

@@ -34,8 +34,8 @@ struct alignas(64) Fans {
   std::uint32_t count = 0;
 };
 
-/// Entries that need another start.
-struct alignas(64) Lost {
+/// Entries far from the surface that was found.
+struct alignas(64) Remote {
   std::int32_t entry[kPadded];
   std::uint32_t count = 0;
 };
@@ -45,31 +45,16 @@ class Walker {
   Walker(const Looker& looker, const Wants& wants, Entries& entries) noexcept
       : looker_(looker), part_(looker.part()), wants_(wants), entries_(entries) {}
 
-  /// Refines those of the entries [begin, end) for whose points `asked` is not 0.
+  /// Refines those of the entries [begin, end) for whose points `asked` is not 0: Chart::look.
   HWY_NOINLINE void refine(std::uint32_t begin, std::uint32_t end, const std::int32_t* asked) noexcept {
-    Lost lost;
     for (std::uint32_t i = begin; i < end; i += lane_count()) {
-      const VI flags = hn::LoadU(kDI, entries_.flags + i);
       const VI wished = hn::GatherIndex(kDI, asked, hn::LoadU(kDI, entries_.point + i));
       const M wanted = hn::And(hn::FirstN(kD, end - i), as_float(hn::Gt(wished, hn::Zero(kDI))));
-      const auto has = [&](std::int32_t flag) HWY_ATTR {
-        return as_float(hn::Ne(hn::And(flags, hn::Set(kDI, flag)), hn::Zero(kDI)));
-      };
-      const M eligible = hn::And(wanted, has(kPatch));
-      const M stray = hn::AndNot(eligible, hn::And(wanted, has(kInside)));
-      const VI entry = hn::Iota(kDI, static_cast<std::int32_t>(i));
-      if (!none(stray)) {
-        hn::StoreU(hn::Compress(entry, hn::RebindMask(kDI, stray)), kDI, lost.entry + lost.count);
-        lost.count += static_cast<std::uint32_t>(hn::CountTrue(kD, stray));
-      }
-      if (none(eligible)) continue;
-      walk(load3(entries_.x, entries_.y, entries_.z, i), hn::LoadU(kD, entries_.row + i),
-           hn::LoadU(kD, entries_.col + i), entry, eligible);
+      if (!none(wanted)) set_out(i, wanted);
     }
-    if (lost.count > 0) seek(lost, kBeside);
     go_on();
     if (fans_.count > 0) fans();
-    seek_elsewhere(begin, end, asked);
+    set_out_again(begin, end);
   }
 
  private:
@@ -78,12 +63,13 @@ class Walker {
 
   HWY_INLINE void solve(Walk& walk, const VPatch& patch, const V3& error, M lanes) const noexcept;
   HWY_INLINE M advance(Walk& walk, VCell& cell, M active) const noexcept;
-  SQMAP_KERNEL Walk begin(const V3& p, V row, V col, VCell& cell) const noexcept;
-  HWY_NOINLINE void walk(const V3& p, V row, V col, VI entry, M lanes) noexcept;
+  SQMAP_KERNEL Walk begin(const V3& p, V row, V col, VCell& cell, M& eligible) const noexcept;
+  HWY_INLINE void replace(M lanes, Walk& by, const VCell& by_cell, Walk& walk, VCell& cell) const noexcept;
+  HWY_NOINLINE M find_beside(const V3& p, M lanes, V& row, V& col) const noexcept;
+  HWY_NOINLINE void set_out(std::uint32_t i, M wanted) noexcept;
+  HWY_NOINLINE void set_out_again(std::uint32_t begin, std::uint32_t end) noexcept;
+  HWY_INLINE void go(Walk& walk, VCell& cell, VI entry, M lanes) noexcept;
   HWY_NOINLINE void go_on() noexcept;
-  HWY_NOINLINE void seek(const Lost& lost, const Rings& rings) noexcept;
-  HWY_NOINLINE void seek_elsewhere(std::uint32_t begin, std::uint32_t end,
-                                   const std::int32_t* asked) noexcept;
   HWY_NOINLINE void keep(Walk& walk, VI entry, M lanes) noexcept;
   HWY_NOINLINE void end(const Walk& walk, VI entry, M lanes) noexcept;
   HWY_NOINLINE M set_aside(const Walk& walk, const VCell& cell, VI entry, M lanes) noexcept;
@@ -111,17 +97,21 @@ HWY_INLINE void Walker::solve(Walk& walk, const VPatch& patch, const V3& error, 
   const V inverse = one / pick(regular, determinant, pick(rows_only, a, one));
   const V d_row = pick(regular, (c * f - b * g) * inverse, hn::IfThenElseZero(rows_only, f * inverse));
   const V d_col = hn::IfThenElseZero(regular, (a * g - b * f) * inverse);
-  const V slimness =
-      hn::Sqrt(a / most(most(c, all(kLeastAngle) * a), all(std::numeric_limits<float>::min())));
   const V most_row = all(kMostCells * looker_.size());
-  const V most_col = least(all(looker_.turn() * 0.125F), most_row * most(slimness, one));
+  V most_col = least(all(looker_.turn() * 0.125F), most_row);
+  if (!none(hn::And(lanes, hn::Gt(hn::Abs(d_col), most_col)))) {
+    const V slimness =
+        hn::Sqrt(a / most(most(c, all(kLeastAngle) * a), all(std::numeric_limits<float>::min())));
+    most_col = least(all(looker_.turn() * 0.125F), most_row * most(slimness, one));
+  }
   walk.d_row = pick(lanes, limited(d_row, hn::Neg(most_row), most_row), walk.d_row);
   walk.d_col = pick(lanes, limited(d_col, hn::Neg(most_col), most_col), walk.d_col);
 }
 
-SQMAP_KERNEL Walk Walker::begin(const V3& p, V row, V col, VCell& cell) const noexcept {
+/// `eligible`: the lanes whose cell bounds a patch; the others' walks mean nothing.
+SQMAP_KERNEL Walk Walker::begin(const V3& p, V row, V col, VCell& cell, M& eligible) const noexcept {
   cell = looker_.cell_at(row, col);
-  looker_.read(cell);
+  eligible = looker_.read(cell).eligible;
   const VPatch patch = looker_.patch_at(cell, row, col);
   const V3 error = p - patch.point;
   Walk walk;
@@ -183,9 +173,18 @@ HWY_INLINE M Walker::advance(Walk& walk, VCell& cell, M active) const noexcept {
   return active;
 }
 
-HWY_NOINLINE void Walker::walk(const V3& p, V row, V col, VI entry, M lanes) noexcept {
-  VCell cell;
-  Walk walk = begin(p, row, col, cell);
+HWY_INLINE void Walker::replace(M lanes, Walk& by, const VCell& by_cell, Walk& walk,
+                                VCell& cell) const noexcept {
+  V *to[kWalkFields], *from[kWalkFields];
+  fields_of(walk, to);
+  fields_of(by, from);
+  for (int k = 0; k < kWalkFields; ++k) *to[k] = pick(lanes, *from[k], *to[k]);
+  walk.cell_row = cell.row = pick(lanes, by_cell.row, cell.row);
+  walk.cell_col = cell.col = pick(lanes, by_cell.col, cell.col);
+  for (int k = 0; k < 4; ++k) cell.depth[k] = pick(lanes, by_cell.depth[k], cell.depth[k]);
+}
+
+HWY_INLINE void Walker::go(Walk& walk, VCell& cell, VI entry, M lanes) noexcept {
   M active = lanes;
   for (int step = 0; step < kFirstSteps; ++step) {
     active = advance(walk, cell, active);
@@ -234,77 +233,95 @@ HWY_NOINLINE void Walker::go_on() noexcept {
   pending_.count = 0;
 }
 
-/// Chart::nearest_start around (row, col), then walks from there.
-HWY_NOINLINE void Walker::seek(const Lost& lost, const Rings& rings) noexcept {
-  const float last = looker_.last_row() - looker_.size() / 2;
-  const V half = all(looker_.size() / 2), turn = all(looker_.turn()), zero = hn::Zero(kD);
-  const V infinity = all(std::numeric_limits<float>::infinity());
-  for (std::uint32_t i = 0; i < lost.count; i += lane_count()) {
-    const M lanes = hn::FirstN(kD, lost.count - i);
-    const VI entry = pick(lanes, hn::LoadU(kDI, lost.entry + i), hn::Set(kDI, kNobody));
-    const auto field = [&](const float* values)
-                           HWY_ATTR { return hn::IfThenElseZero(lanes, hn::GatherIndex(kD, values, entry)); };
-    const V3 p{field(entries_.x), field(entries_.y), field(entries_.z)};
-    V row = field(entries_.row), col = field(entries_.col);
-    const VCell middle = looker_.cell_at(row, col);
-    const V mid_row = to_float(middle.row) + half, mid_col = to_float(middle.col) + half;
-    const V within = all(kNearer) * field(entries_.distance);
-    const V limit = rings.is_for_any ? infinity : within * within;
-    V best = limit;
-    M seeking = lanes;
-    for (int ring = rings.first; ring < rings.end; ++ring) {
-      const V step = all(static_cast<float>(looker_.stride() << ring));
-      for (int k = 0; k < 9; ++k) {
-        if (k == 4) continue;  // the middle
-        const int rows_up = k / 3 - 1;
-        const V here_row = mid_row + all(static_cast<float>(rows_up)) * step;
-        V here_col = mid_col + all(static_cast<float>(k % 3 - 1)) * step;
-        here_col = pick(hn::Lt(here_col, zero), here_col + turn, here_col);
-        here_col = pick(hn::Lt(here_col, turn), here_col, here_col - turn);
-        M on_map = hn::AndNot(hn::Lt(here_row, half), hn::Le(here_row, all(last)));
-        on_map = hn::And(on_map, hn::And(hn::Ge(here_col, zero), hn::Lt(here_col, turn)));
-        on_map = hn::And(on_map, seeking);
-        if (none(on_map)) continue;
-        VCell cell = looker_.cell_at(here_row, here_col);
-        const M open = hn::And(looker_.read(cell).eligible, on_map);
-        if (none(open)) continue;
-        const V3 d = p - looker_.patch_at(cell, here_row, here_col).point;
-        const V square = dot3(d, d);
-        const M better = hn::And(open, hn::Lt(square, best));
-        best = pick(better, square, best);
-        row = pick(better, here_row, row);
-        col = pick(better, here_col, col);
-      }
-      if (!rings.is_for_any) continue;
-      seeking = hn::AndNot(hn::Lt(best, limit), seeking);
-      if (none(seeking)) break;
-    }
-    const M found = hn::And(lanes, hn::Lt(best, limit));
-    if (!none(found)) walk(p, row, col, entry, found);
+/// Chart::start_beside, which moves (row, col). The lanes that found a start.
+HWY_NOINLINE M Walker::find_beside(const V3& p, M lanes, V& row, V& col) const noexcept {
+  const float size = looker_.size();
+  const V half = all(size / 2), turn = all(looker_.turn()), zero = hn::Zero(kD);
+  const VCell middle = looker_.cell_at(row, col);
+  const V mid_row = to_float(middle.row) + half, mid_col = to_float(middle.col) + half;
+  V best = all(std::numeric_limits<float>::infinity());
+  for (int k = 0; k < 9; ++k) {
+    if (k == 4) continue;  // the middle
+    const int rows_up = k / 3 - 1;
+    const V here_row = mid_row + all(static_cast<float>(rows_up) * size);
+    V here_col = mid_col + all(static_cast<float>(k % 3 - 1) * size);
+    here_col = pick(hn::Lt(here_col, zero), here_col + turn, here_col);
+    here_col = pick(hn::Lt(here_col, turn), here_col, here_col - turn);
+    M open = hn::And(lanes, hn::And(hn::Gt(here_row, zero), hn::Lt(here_row, all(looker_.last_row()))));
+    VCell cell = looker_.cell_at(here_row, here_col);
+    open = hn::And(open, looker_.read(cell).eligible);
+    if (none(open)) continue;
+    const V3 error = p - looker_.patch_at(cell, here_row, here_col).point;
+    const V square = dot3(error, error);
+    const M better = hn::And(open, hn::Lt(square, best));
+    best = pick(better, square, best);
+    row = pick(better, here_row, row);
+    col = pick(better, here_col, col);
   }
+  return hn::And(lanes, hn::Lt(best, all(std::numeric_limits<float>::infinity())));
 }
 
-/// For points inside: where the surface is far, another hillside may be nearer.
-HWY_NOINLINE void Walker::seek_elsewhere(std::uint32_t begin, std::uint32_t end,
-                                         const std::int32_t* asked) noexcept {
+/// From the foot or, where that is nearer to an inner point, from where the table of starts says.
+HWY_NOINLINE void Walker::set_out(std::uint32_t i, M wanted) noexcept {
+  const VI flags = hn::LoadU(kDI, entries_.flags + i), start = hn::LoadU(kDI, entries_.start + i);
+  const auto has = [&](std::int32_t flag) HWY_ATTR {
+    return as_float(hn::Ne(hn::And(flags, all_int(static_cast<std::uint32_t>(flag))), hn::Zero(kDI)));
+  };
+  const M at_foot = hn::And(wanted, has(kPatch));
+  const V3 p = load3(entries_.x, entries_.y, entries_.z, i);
+  V row = hn::LoadU(kD, entries_.other_row + i), col = hn::LoadU(kD, entries_.other_col + i);
+  const M inside = hn::And(wanted, has(kInside));
+  const M stray = hn::AndNot(at_foot, inside);
+  M lanes = at_foot;
+  if (!none(stray)) lanes = hn::Or(lanes, find_beside(p, stray, row, col));
+  VCell cell;
+  M eligible;
+  Walk walk = begin(p, row, col, cell, eligible);
+  const M named = hn::And(inside, as_float(hn::Ne(start, all_int(StartTable::kNone))));
+  if (!none(named)) {
+    const VI place = pick(named, start, hn::Zero(kDI));
+    const V there_row = looker_.start_place(hn::ShiftRight<8>(place));
+    const V there_col = looker_.start_place(hn::And(place, all_int(255)));
+    VCell there;
+    Walk from_there = begin(p, there_row, there_col, there, eligible);
+    const M open = hn::And(named, eligible);
+    const M both = hn::And(open, lanes);
+    const M nearer = hn::AndNot(hn::AndNot(hn::Lt(from_there.square, walk.square), both), open);
+    hn::StoreU(pick(nearer, row, there_row), kD, entries_.other_row + i);
+    hn::StoreU(pick(nearer, col, there_col), kD, entries_.other_col + i);
+    hn::StoreU(hn::Or(flags, pick(both, all_int(kOther), hn::Zero(kDI))), kDI, entries_.flags + i);
+    replace(nearer, from_there, there, walk, cell);
+    lanes = hn::Or(lanes, open);
+  }
+  if (!none(lanes)) go(walk, cell, hn::Iota(kDI, static_cast<std::int32_t>(i)), lanes);
+}
+
+/// From the other start, for points that are far from the surface that was found.
+HWY_NOINLINE void Walker::set_out_again(std::uint32_t begin, std::uint32_t end) noexcept {
   const V far = all(Chart::far_from(part_, looker_.stride()));
-  const V infinity = all(std::numeric_limits<float>::infinity());
-  Lost far_off;
+  Remote remote;
   for (std::uint32_t i = begin; i < end; i += lane_count()) {
-    const VI wished = hn::GatherIndex(kDI, asked, hn::LoadU(kDI, entries_.point + i));
-    const M wanted = hn::And(hn::FirstN(kD, end - i), as_float(hn::Gt(wished, hn::Zero(kDI))));
-    const V distance = hn::LoadU(kD, entries_.distance + i);
-    const VI inside = hn::And(hn::LoadU(kDI, entries_.flags + i), all_int(kInside));
-    M is_far = hn::And(wanted, hn::And(hn::Gt(distance, far), hn::Lt(distance, infinity)));
-    is_far = hn::And(is_far, as_float(hn::Ne(inside, hn::Zero(kDI))));
+    const VI other = hn::And(hn::LoadU(kDI, entries_.flags + i), all_int(kOther));
+    M is_far = hn::And(as_float(hn::Ne(other, hn::Zero(kDI))), hn::FirstN(kD, end - i));
+    is_far = hn::And(is_far, hn::Gt(hn::LoadU(kD, entries_.distance + i), far));
     if (none(is_far)) continue;
     const VI entry = hn::Iota(kDI, static_cast<std::int32_t>(i));
-    hn::StoreU(hn::Compress(entry, hn::RebindMask(kDI, is_far)), kDI, far_off.entry + far_off.count);
-    far_off.count += static_cast<std::uint32_t>(hn::CountTrue(kD, is_far));
+    hn::StoreU(hn::Compress(entry, hn::RebindMask(kDI, is_far)), kDI, remote.entry + remote.count);
+    remote.count += static_cast<std::uint32_t>(hn::CountTrue(kD, is_far));
   }
-  if (far_off.count == 0) return;
+  if (remote.count == 0) return;
   must_be_nearer_ = true;
-  seek(far_off, kElsewhere);
+  for (std::uint32_t i = 0; i < remote.count; i += lane_count()) {
+    const M lanes = hn::FirstN(kD, remote.count - i);
+    const VI entry = pick(lanes, hn::LoadU(kDI, remote.entry + i), hn::Set(kDI, kNobody));
+    const auto field = [&](const float* values)
+                           HWY_ATTR { return hn::IfThenElseZero(lanes, hn::GatherIndex(kD, values, entry)); };
+    VCell cell;
+    M eligible;
+    Walk walk = this->begin({field(entries_.x), field(entries_.y), field(entries_.z)},
+                            field(entries_.other_row), field(entries_.other_col), cell, eligible);
+    go(walk, cell, entry, lanes);
+  }
   go_on();
   if (fans_.count > 0) fans();
   must_be_nearer_ = false;

@@ -265,6 +265,7 @@ TEST(Resident, TakesTheBytesItsFormulaSays) {
     bool seam = false;
     for (const std::uint8_t b : part.map.start_inside) seam = seam || b != 0;
     bytes += sizeof(PartRecord) + 520 + (texels * (part.map.bits + (seam ? 1U : 0U)) + 7) / 8;
+    bytes += 8 * ((part.map.rows + 7) / 8) * ((part.map.cols + 7) / 8);  // four starts a tile
     const std::size_t blocks = (texels + 63) / 64;
     if (!part.map.crossings.empty()) bytes += blocks + 6 * part.map.crossings.size();
     if (!part.map.vertex_samples.empty()) bytes += blocks + 8 * part.map.vertex_samples.size();

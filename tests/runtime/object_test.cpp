@@ -250,6 +250,36 @@ TEST(Object, InnerPointsHaveADistanceEvenBesideASeam) {
   EXPECT_GT(inner, 5000);
 }
 
+TEST(Object, MostInnerPointsFindTheNearestWallWhereTheirFootLiesBehindAnother) {
+  // A plate across a wide superquadric: of most points of its sides the foot lies behind an edge of the
+  // plate.
+  const Vec3d half_m{0.4, 0.8, 0.75}, centre_m{0.05, 0, 0};
+  const auto crossings = [&](const Vec3d& o, const Vec3d& d, bool& inside) {
+    double enter = -1e9, leave = 1e9;
+    for (int k = 0; k < 3; ++k) {
+      const double a = (centre_m[k] - half_m[k] - o[k]) / d[k], b = (centre_m[k] + half_m[k] - o[k]) / d[k];
+      enter = std::max(enter, std::min(a, b));
+      leave = std::min(leave, std::max(a, b));
+    }
+    inside = false;
+    return enter < leave && leave > 0 ? std::vector<double>{enter, leave} : std::vector<double>{};
+  };
+  const Object object =
+      built(test::asset_of({test::traced_part({{1.3, 1.1, 1}, 0.8, 0.8}, {}, 65, 128, 1, 2, crossings)}, 2));
+  std::mt19937 rng(21);
+  std::uniform_real_distribution<double> share(-0.85, 0.85);
+  int far_off = 0;
+  for (int i = 0; i < 4000; ++i) {
+    const Vec3d from_centre{half_m.x * share(rng), half_m.y * share(rng), half_m.z * share(rng)};
+    double nearest_m = 1;
+    for (int k = 0; k < 3; ++k) nearest_m = std::min(nearest_m, half_m[k] - std::abs(from_centre[k]));
+    const Answer answer = object.query(cast<float>(centre_m + from_centre), {Layer::kThree});
+    ASSERT_TRUE(answer.inside);
+    far_off += std::abs(-answer.signed_distance_m - nearest_m) > 0.03;
+  }
+  EXPECT_LT(far_off, 700) << "of 4000; from the feet alone more than half are";
+}
+
 TEST(Object, OffsetKeepsFacesOutThatTheirCornersMiss) {
   const Object object = built(test::ball_in_ellipsoid(kRadius, 65, 128));
   constexpr float kEdge = 0.4F;

@@ -142,9 +142,10 @@ class Object {
   ///
   ///     constant + sum over parts of  record + 520 + ceil(n (b + s) / 8) + [c > 0] (ceil(n / 64) + 6 c)
   ///                                                                      + [v > 0] (ceil(n / 64) + 8 v)
-  ///                                   + 36 m^2
+  ///                                   + 8 t + 36 m^2
   ///
   /// m cells a side of the part's bounds, 0 without; s = 1 where any texel starts inside the mesh, else 0.
+  /// t tiles of at least 8 x 8 texels, at most 128 a part, each with four starts of layer 3.
   /// The constant is below 200 bytes and the record below 256, both fixed by the build.
   std::size_t resident_bytes() const noexcept;
 

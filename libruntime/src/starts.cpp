@@ -1,0 +1,129 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// The table of starts of layer 3 (StartTable). The nearest patch of every box is searched among the cells of
+// a coarser grid, in groups that are passed over where they are surely farther.
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include "chart.hpp"
+#include "resident.hpp"
+
+namespace sqmap::runtime {
+
+namespace {
+
+constexpr std::uint32_t kLeastTileShift = 3;     // tiles of 8 x 8 cells
+constexpr std::uint32_t kMostTiles = 128;        // or larger ones
+constexpr std::uint32_t kMostCandidates = 2048;  // cells of the coarser grid
+constexpr std::uint32_t kMostSide = 255;         // of that grid, less than what kNone names
+constexpr std::uint32_t kGroupShift = 2;         // groups of 4 x 4 candidates
+
+struct Candidate {
+  Vec3f point;
+  std::uint16_t name;
+};
+struct Group {
+  Vec3f centre;
+  float radius;
+  std::uint32_t begin, end;
+};
+
+/// Cells of the coarser grid along one side of `cells` cells.
+std::uint32_t side_of(std::uint32_t cells, std::uint32_t step_shift) noexcept {
+  const std::uint32_t first = (1U << step_shift) / 2;
+  return cells > first ? ((cells - 1 - first) >> step_shift) + 1 : 0;
+}
+
+std::uint32_t tiles_of(std::uint32_t cells, std::uint32_t shift) noexcept {
+  return ((cells - 1) >> shift) + 1;
+}
+
+}  // namespace
+
+StartTable StartTable::of(std::uint32_t rows, std::uint32_t cols, const Vec3f& semi_axes) noexcept {
+  StartTable table;
+  std::uint32_t tile = kLeastTileShift, step = 0;
+  // A foot may lie on the last row of nodes.
+  while (tiles_of(rows, tile) * tiles_of(cols, tile) > kMostTiles) ++tile;
+  while (side_of(rows - 1, step) * side_of(cols, step) > kMostCandidates ||
+         side_of(rows - 1, step) > kMostSide || side_of(cols, step) > kMostSide)
+    ++step;
+  table.tile_shift = static_cast<std::uint8_t>(tile);
+  table.step_shift = static_cast<std::uint8_t>(step);
+  table.tile_rows = tiles_of(rows, tile);
+  table.tile_cols = tiles_of(cols, tile);
+  // No point of a superquadric lies deeper than its shortest semi-axis.
+  table.depths_per_unit = kDepths / lesser(lesser(semi_axes.x, semi_axes.y), semi_axes.z);
+  return table;
+}
+
+void Resident::fill_starts(const PartRecord& part) {
+  const StartTable& starts = part.starts;
+  ShapeTable<float> shape;
+  unpack(part, shape);
+  const Chart chart(*this, part, shape);
+  const std::uint32_t rows = side_of(part.rows - 1, starts.step_shift),
+                      cols = side_of(part.cols, starts.step_shift);
+
+  std::vector<Candidate> candidates;
+  std::vector<Group> groups;
+  const std::uint32_t side = 1U << kGroupShift;
+  for (std::uint32_t row = 0; row < rows; row += side) {
+    for (std::uint32_t col = 0; col < cols; col += side) {
+      Group group{{}, 0, static_cast<std::uint32_t>(candidates.size()), 0};
+      for (std::uint32_t r = row; r < std::min(row + side, rows); ++r) {
+        for (std::uint32_t c = col; c < std::min(col + side, cols); ++c) {
+          Vec3f point;
+          if (chart.patch_point(starts.place(r), starts.place(c), point))
+            candidates.push_back({point, static_cast<std::uint16_t>(r << 8U | c)});
+        }
+      }
+      group.end = static_cast<std::uint32_t>(candidates.size());
+      if (group.end == group.begin) continue;
+      for (std::uint32_t k = group.begin; k < group.end; ++k)
+        group.centre =
+            group.centre + (1.0F / static_cast<float>(group.end - group.begin)) * candidates[k].point;
+      for (std::uint32_t k = group.begin; k < group.end; ++k)
+        group.radius = greater(group.radius, norm(candidates[k].point - group.centre));
+      groups.push_back(group);
+    }
+  }
+  if (groups.empty()) return;
+
+  const float tile = static_cast<float>(1U << starts.tile_shift);
+  std::vector<float> distance(groups.size());
+  std::uint8_t* out = bytes_.get() + starts.at;
+  for (std::uint32_t row = 0; row < starts.tile_rows; ++row) {
+    for (std::uint32_t col = 0; col < starts.tile_cols; ++col) {
+      const float mid_row =
+          lesser((static_cast<float>(row) + 0.5F) * tile, static_cast<float>(part.rows - 1));
+      const float mid_col = lesser((static_cast<float>(col) + 0.5F) * tile, static_cast<float>(part.cols));
+      const SurfaceSample<float> surface = shape.sample(mid_row, mid_col);
+      for (std::uint32_t k = 0; k < StartTable::kDepths; ++k, out += 2) {
+        const float depth = (static_cast<float>(k) + 0.5F) / starts.depths_per_unit;
+        const Vec3f p = surface.point_m - depth * surface.normal;
+        for (std::size_t g = 0; g < groups.size(); ++g) distance[g] = norm(groups[g].centre - p);
+        const auto closest = std::min_element(distance.begin(), distance.end()) - distance.begin();
+        Candidate best{{}, StartTable::kNone};
+        float nearest = std::numeric_limits<float>::infinity();
+        const auto consider = [&](const Group& group) {
+          for (std::uint32_t i = group.begin; i < group.end; ++i) {
+            const float here = norm(candidates[i].point - p);
+            if (!(here < nearest)) continue;
+            nearest = here;
+            best = candidates[i];
+          }
+        };
+        consider(groups[static_cast<std::size_t>(closest)]);
+        for (std::size_t g = 0; g < groups.size(); ++g)
+          if (distance[g] - groups[g].radius < nearest) consider(groups[g]);
+        std::memcpy(out, &best.name, sizeof best.name);
+      }
+    }
+  }
+}
+
+}  // namespace sqmap::runtime
