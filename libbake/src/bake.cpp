@@ -299,7 +299,10 @@ Result<BakeResult> bake(const SourceMesh& source, const BakeOptions& asked, cons
   result.stopped_by = refined.value().stopped_by;
   Asset& asset = result.asset;
   asset.r_max_m = r_max_m;
-  for (const Piece& piece : pieces) asset.parts.push_back(piece.part);
+  for (const Piece& piece : pieces) {
+    asset.parts.push_back(piece.part);
+    result.fits.push_back(piece.fit);
+  }
   asset.sphere = enclosing_sphere(asset.parts);
   const std::vector<std::uint16_t> owner = owners(pieces, fine, prepared.mesh.faces.size());
   count_members(asset.parts, prepared.mesh, owner);

@@ -238,6 +238,20 @@ Outcome FitOptions::check() const {
   return Done{};
 }
 
+const char* fit_stop_name(FitStop stop) noexcept {
+  switch (stop) {
+    case FitStop::kPoint:
+      return "point";
+    case FitStop::kGain:
+      return "gain";
+    case FitStop::kNoDescent:
+      return "no-descent";
+    case FitStop::kIterations:
+      return "iterations";
+  }
+  return "unknown";
+}
+
 double volume_m3(const Superquadric& shape) {
   const auto beta = [](double x, double y) { return std::tgamma(x) * std::tgamma(y) / std::tgamma(x + y); };
   return 2 * shape.semi_axes_m.x * shape.semi_axes_m.y * shape.semi_axes_m.z * shape.e1 * shape.e2 *

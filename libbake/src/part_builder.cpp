@@ -2,21 +2,24 @@
 #include "part_builder.hpp"
 
 #include <algorithm>
+#include <utility>
 
 namespace sqmap::bake {
 
-Result<Part> fit_part(const SolidSet& set, const Cell& cell, const FitOptions& options) {
+Result<FittedPart> fit_part(const SolidSet& set, const Cell& cell, const FitOptions& options) {
   const std::vector<Vec3d> points_m = set.points(cell.solid);
   auto fit = fit_superquadric(points_m, options);
   if (!fit) return fit.error();
   // A box wants sharper edges than the usual bound on exponents allows. On other parts that bound costs 2-3 %
   // of volume and buys smoother maps.
   constexpr double kWorthSharpEdges = 0.9;
+  int iterations = fit.value().iterations;
   const Superquadric& shape = fit.value().shape;
   if (std::min(shape.e1, shape.e2) < 1.01 * options.min_exponent) {
     FitOptions sharp = options;
     sharp.min_exponent = kMinExponent;
     auto boxy = fit_superquadric(points_m, sharp);
+    if (boxy) iterations += boxy.value().iterations;
     if (boxy && boxy.value().volume_m3 < kWorthSharpEdges * fit.value().volume_m3) fit = std::move(boxy);
   }
   Part part;
@@ -26,7 +29,7 @@ Result<Part> fit_part(const SolidSet& set, const Cell& cell, const FitOptions& o
   part.segment = cell.segment;
   part.reason = cell.reason;
   part.volume_m3 = set.volume_m3(cell.solid);
-  return part;
+  return FittedPart{std::move(part), {iterations, fit.value().stop}};
 }
 
 void draft_map(Part& part, const MeshQueries& queries, std::uint32_t quadrant_cells) {

@@ -4,15 +4,21 @@
 #include <vector>
 
 #include "sqmap/asset/asset.hpp"
-#include "sqmap/bake/fit.hpp"
+#include "sqmap/bake/bake.hpp"
 
 #include "map_builder.hpp"
 #include "partition.hpp"
 
 namespace sqmap::bake {
 
-/// The bounding superquadric of a cell, as a part without a map.
-Result<Part> fit_part(const SolidSet& set, const Cell& cell, const FitOptions& options);
+/// A part without a map, and how its superquadric was found.
+struct FittedPart {
+  Part part;
+  PartFit fit;
+};
+
+/// The bounding superquadric of a cell.
+Result<FittedPart> fit_part(const SolidSet& set, const Cell& cell, const FitOptions& options);
 
 /// A map of fixed resolution with 16-bit codes, for judging a partition before the final maps are planned.
 void draft_map(Part& part, const MeshQueries& queries, std::uint32_t quadrant_cells);

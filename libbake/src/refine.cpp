@@ -35,9 +35,9 @@ constexpr int kMostTrials = 4;
 /// A cell with a quick fit and a draft map, enough to judge it by.
 Result<Piece> draft_piece(const SolidSet& set, Cell cell, const MeshQueries& queries, FitOptions options) {
   options.quick = true;
-  auto part = fit_part(set, cell, options);
-  if (!part) return part.error();
-  Piece piece{std::move(cell), std::move(part).value(), {}, 0, {}};
+  auto fitted = fit_part(set, cell, options);
+  if (!fitted) return fitted.error();
+  Piece piece{std::move(cell), std::move(fitted.value().part), fitted.value().fit, {}, 0, {}};
   draft_map(piece.part, queries, kDraftQuadrantCells);
   return piece;
 }
@@ -46,11 +46,12 @@ Result<Piece> draft_piece(const SolidSet& set, Cell cell, const MeshQueries& que
 Outcome fit_pieces(const SolidSet& set, std::vector<Piece>& pieces, const FitOptions& options) {
   std::vector<std::optional<Error>> errors(pieces.size());
   tbb::parallel_for(std::size_t{0}, pieces.size(), [&](std::size_t k) {
-    auto part = fit_part(set, pieces[k].cell, options);
-    if (part) {
-      pieces[k].part = std::move(part).value();
+    auto fitted = fit_part(set, pieces[k].cell, options);
+    if (fitted) {
+      pieces[k].part = std::move(fitted.value().part);
+      pieces[k].fit = fitted.value().fit;
     } else {
-      errors[k] = part.error();
+      errors[k] = fitted.error();
     }
   });
   for (const auto& error : errors) {

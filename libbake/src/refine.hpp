@@ -22,6 +22,7 @@ struct Spare {
 struct Piece {
   Cell cell;
   Part part;
+  PartFit fit;
   std::optional<std::vector<HalfSpace>> cuts;  ///< planes to split it by, best first
   std::size_t cuts_tried{};                    ///< of them, those that did not pay
   std::optional<Spare> spare;                  ///< of those, the one that cost least

@@ -276,6 +276,12 @@ std::vector<DegenerateCase> degenerate_cases() {
   cases.push_back({"nearly coplanar", near_plane});
   cases.push_back({"needle", moved(needle, random_pose(rng))});
   cases.push_back({"plate", moved(plate, random_pose(rng))});
+  for (const double apart : {3.0, 1e6}) {
+    const Points near_one = blob(50, rng), far_one = moved(blob(50, rng), {{}, {apart, 0.3 * apart, 0}});
+    Points both = near_one;
+    both.insert(both.end(), far_one.begin(), far_one.end());
+    cases.push_back({"two clusters, " + std::to_string(apart) + " apart", both});
+  }
   const Points cloud = blob(100, rng);
   cases.push_back({"micrometres", moved(cloud, random_pose(rng), 1e-6)});
   cases.push_back({"micrometres at the origin", moved(cloud, {}, 1e-6)});
@@ -332,6 +338,49 @@ TEST(FitSuperquadric, FlatSetsGetTheThinnestShapeAllowed) {
     EXPECT_LT(thinnest, 2 * ratio * longest);
     EXPECT_LT(fit.hull_volume_m3, 1e-12);
   }
+}
+
+TEST(FitSuperquadric, TwoFarClustersGetANeedleAlongTheLineBetweenThem) {
+  std::mt19937_64 rng(23);
+  const Vec3d along = normalized(Vec3d{3, -2, 1});
+  for (const double apart_m : {20.0, 1e6}) {
+    Points points = blob(60, rng);
+    const Points others = moved(blob(60, rng), {{}, apart_m * along});
+    points.insert(points.end(), others.begin(), others.end());
+    const Fit fit = fit_superquadric(points).value();
+    expect_bounded(fit, points);
+    const Vec3d& a = fit.shape.semi_axes_m;
+    EXPECT_GT(a.z, apart_m / 2) << apart_m;
+    EXPECT_LT(std::max(a.x, a.y), 0.2 * a.z) << apart_m;
+    const Vec3d axis = rotation(fit.object_from_part.orientation).apply({0, 0, 1});
+    EXPECT_GT(std::abs(dot(axis, along)), 0.99) << apart_m;
+    EXPECT_GT(fit.iterations, 0) << apart_m;
+  }
+}
+
+TEST(FitSuperquadric, SaysWhyItStopped) {
+  std::mt19937_64 rng(24);
+  const Fit point = fit_superquadric(Points(3, Vec3d{1, 2, 3})).value();
+  EXPECT_EQ(point.stop, FitStop::kPoint);
+  EXPECT_EQ(point.iterations, 0);
+
+  FitOptions one_step;
+  one_step.max_iterations = 1;
+  for (int i = 0; i < 5; ++i) {
+    const Points points = blob(200, rng);
+    const Fit free = fit_superquadric(points).value(), cut_short = fit_superquadric(points, one_step).value();
+    EXPECT_EQ(free.stop, FitStop::kGain) << i;
+    EXPECT_EQ(cut_short.stop, FitStop::kIterations) << i;
+    EXPECT_GT(cut_short.iterations, 0) << i;
+    EXPECT_GT(free.iterations, 2 * cut_short.iterations) << i;
+  }
+}
+
+TEST(FitStop, NamesDiffer) {
+  EXPECT_STREQ(fit_stop_name(FitStop::kPoint), "point");
+  EXPECT_STREQ(fit_stop_name(FitStop::kGain), "gain");
+  EXPECT_STREQ(fit_stop_name(FitStop::kNoDescent), "no-descent");
+  EXPECT_STREQ(fit_stop_name(FitStop::kIterations), "iterations");
 }
 
 TEST(FitSuperquadric, RefusesNoPointsAndCoordinatesOutOfRangeByIndex) {

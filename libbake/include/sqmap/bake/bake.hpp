@@ -47,11 +47,18 @@ struct StageTime {
   double seconds;
 };
 
+/// How the superquadric of a part was found.
+struct PartFit {
+  int iterations{};  ///< of all optimisation runs, those with sharper edges among them
+  FitStop stop{};    ///< of the run that gave the shape
+};
+
 struct BakeResult {
   Asset asset;
   std::vector<StageTime> times;  ///< not stored in the bundle
   /// What ended the refinement: "target", "parts", "bytes", or "gain": no further split lowered the error.
   std::string stopped_by;
+  std::vector<PartFit> fits;  ///< one a part of the asset, in its order; not stored in the bundle
 };
 
 /// The whole line: check, repair, decompose, fit, map, measure.

@@ -33,6 +33,9 @@ enum class FitStop : std::uint8_t {
   kIterations,  ///< FitOptions::max_iterations
 };
 
+/// Stable, as in records: "point", "gain", "no-descent", "iterations".
+const char* fit_stop_name(FitStop stop) noexcept;
+
 struct Fit {
   Superquadric shape;  ///< of fits within 2 % of volume, the one whose longest semi-axis is a3
   Pose object_from_part;
