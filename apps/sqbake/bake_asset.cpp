@@ -79,6 +79,7 @@ std::optional<Error> bake_into(BakeProduct& product, const BakeJob& job, const A
     record.warnings.push_back(fmt::format(
         "{} hole{} in the mesh filled, where the surface is a guess; --repair safe leaves holes open", holes,
         holes == 1 ? "" : "s"));
+  record.fits = result.value().fits;
   if (!asset.mesh.is_closed)
     record.degradations.push_back(
         {"open-mesh",

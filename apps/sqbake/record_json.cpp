@@ -27,6 +27,9 @@ Json body_of(const BakeRecord& record) {
   }
   json["mesh"] = to_json(record.mesh);
   json["errors"] = to_json(record.errors);
+  json["fits"] = Json::array();
+  for (const bake::PartFit& fit : record.fits)
+    json["fits"].push_back({{"iterations", fit.iterations}, {"stop", bake::fit_stop_name(fit.stop)}});
   json["stages"] = Json::array();
   for (const bake::StageTime& time : record.times)
     json["stages"].push_back({{"stage", time.stage}, {"seconds", time.seconds}});
@@ -73,6 +76,13 @@ ErrorRow row_from(const Json& json) {
   return row;
 }
 
+bake::FitStop stop_from(const std::string& name) {
+  using bake::FitStop;
+  for (const FitStop stop : {FitStop::kPoint, FitStop::kGain, FitStop::kNoDescent, FitStop::kIterations})
+    if (name == bake::fit_stop_name(stop)) return stop;
+  throw std::invalid_argument("stop " + name);
+}
+
 void take_body(const Json& json, BakeRecord& record) {
   record.parts = json.at("parts").get<std::uint32_t>();
   record.segments = json.at("segments").get<std::uint32_t>();
@@ -81,6 +91,8 @@ void take_body(const Json& json, BakeRecord& record) {
   record.stopped_by = json.at("stopped_by").get<std::string>();
   record.mesh = mesh_from(json.at("mesh"));
   for (const Json& row : json.at("errors")) record.errors.push_back(row_from(row));
+  for (const Json& fit : json.at("fits"))
+    record.fits.push_back({fit.at("iterations").get<int>(), stop_from(fit.at("stop").get<std::string>())});
   for (const Json& stage : json.at("stages"))
     record.times.push_back({stage.at("stage").get<std::string>(), stage.at("seconds").get<double>()});
 }

@@ -48,6 +48,7 @@ struct BakeRecord {
   std::uint32_t parts{}, segments{};
   double r_max_m{};
   std::string stopped_by;
+  std::vector<bake::PartFit> fits;  ///< one a part
   MeshRecord mesh;
   std::vector<ErrorRow> errors;
 

@@ -49,6 +49,10 @@ class Folder(FolderTest):
         self.assertIn(ball["stopped_by"], ("target", "parts", "bytes", "gain"))
         self.assertAlmostEqual(ball["r_max_m"], 2, places=5)
         self.assertGreater(len(ball["stages"]), 2)
+        self.assertEqual(len(ball["fits"]), ball["parts"])
+        for fit in ball["fits"]:
+            self.assertGreater(fit["iterations"], 0)
+            self.assertIn(fit["stop"], ("gain", "no-descent", "iterations"))
         self.assertEqual((broken["error"]["id"], broken["error"]["exit_code"]), ("invalid-mesh", 4))
         self.assertEqual((summary["ok"], summary["failed"]), (2, 1))
         whole = json.loads(run("sqbake", "bake", self.models, *ROUGH, "--out-dir", self.out, "--format", "json").stdout)

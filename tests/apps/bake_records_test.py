@@ -72,7 +72,7 @@ class Records(FolderTest):
         good = self.valid(run("sqbake", "bake", self.models / "ball.off", *ROUGH, "-o", self.folder / "a.h5", "--format",
                               "ndjson").stdout.splitlines()[0])
         for change in ({"outcome": "fine"}, {"outcome": "failed"}, {"parts": 0}, {"unknown": 1}, {"schema": "x"},
-                       {"mesh": {}}):
+                       {"mesh": {}}, {"fits": []}, {"fits": [{"iterations": 1, "stop": "fine"}]}):
             with self.subTest(change=change), self.assertRaises(jsonschema.ValidationError):
                 self.validator.validate({**good, **change})
 
