@@ -21,6 +21,23 @@ namespace {
 
 using std::numbers::pi;
 
+constexpr double kDegree = pi / 180;
+
+/// A point, and what layers 2 and 3 must say of it: the distance, negative in the material, and the direction
+/// in which the surface faces where it is nearest.
+struct Place {
+  Vec3d p_m;
+  double depth_m;
+  Vec3d normal;
+};
+
+/// How close it comes.
+struct Closeness {
+  double depth = 0.001;            ///< error of the distance / R_max
+  double angle_rad = 1 * kDegree;  ///< between the normals
+  bool may_be_unknown = false;     ///< the distance, where normals of the superquadric miss the surface
+};
+
 /// What must come of one shape. `depth_m` is below zero in the material, and nowhere farther from zero than
 /// the surface is from the point. NaN: the point is not judged.
 struct Shape {
@@ -32,6 +49,8 @@ struct Shape {
   double most_union;                       ///< volume of the union of the superquadrics / volume_m3
   double most_wrong = 0.01;                ///< depth of a point that is told the wrong side / R_max
   std::vector<Vec3d> inside_m, outside_m;  ///< points to ask about
+  std::vector<Place> places;
+  Closeness layer_2{}, layer_3{};
 };
 
 double box_depth_m(const Vec3d& p, const Vec3d& half_m, const Vec3d& centre_m = {}) {
@@ -56,6 +75,19 @@ double spring_depth_m(const Vec3d& p) {
   return least_m - kWire_m;
 }
 
+/// Below the slanted side of the cone of radius 0.5 and height 1, at this height of the side.
+Place on_cone(double z_m, double turn_rad, double below_m) {
+  const Vec3d n = normalized(Vec3d{std::cos(turn_rad), std::sin(turn_rad), 0.5});
+  const double r_m = 0.5 * (1 - z_m);
+  return {Vec3d{r_m * std::cos(turn_rad), r_m * std::sin(turn_rad), z_m} - below_m * n, -below_m, n};
+}
+
+/// Beside the wire's middle line, away from the coil's axis, or towards it.
+Place on_spring(double turn_rad, double out_m) {
+  const Vec3d out{std::cos(turn_rad), std::sin(turn_rad), 0};
+  return {helix_m(turn_rad) + out_m * out, std::abs(out_m) - kWire_m, out_m > 0 ? out : -out};
+}
+
 std::vector<Shape> make_shapes() {
   std::vector<Shape> shapes;
   shapes.push_back({.name = "cube",
@@ -67,14 +99,22 @@ std::vector<Shape> make_shapes() {
                     .volume_m3 = 1,
                     .most_union = 1.3,
                     .inside_m = {{}, {0.49, 0, 0}, {0.49, 0.49, 0.49}, {-0.49, 0.49, -0.49}},
-                    .outside_m = {{0.51, 0, 0}, {0.51, 0.51, 0.51}, {0, -0.52, 0.4}}});
+                    .outside_m = {{0.51, 0, 0}, {0.51, 0.51, 0.51}, {0, -0.52, 0.4}},
+                    .places = {{{0.45, 0, 0}, -0.05, {1, 0, 0}},
+                               {{0, -0.48, 0.1}, -0.02, {0, -1, 0}},
+                               {{0.2, 0.1, 0.47}, -0.03, {0, 0, 1}},
+                               {{-0.3, 0.44, -0.3}, -0.06, {0, 1, 0}}}});
   shapes.push_back({.name = "sphere",
                     .mesh = test::sphere(1, 4),
                     .depth_m = [](const Vec3d& p) { return norm(p) - 1; },
                     .volume_m3 = 4 * pi / 3,
                     .most_union = 1.02,
                     .inside_m = {{}, {0.98, 0, 0}, {0, 0, -0.98}, {0.56, 0.56, 0.56}},
-                    .outside_m = {{1.02, 0, 0}, {0, 0, -1.02}, {0.6, 0.6, 0.6}}});
+                    .outside_m = {{1.02, 0, 0}, {0, 0, -1.02}, {0.6, 0.6, 0.6}},
+                    .places = {{{0.9, 0, 0}, -0.1, {1, 0, 0}},
+                               {{0, 0, -0.95}, -0.05, {0, 0, -1}},
+                               {{0.54, 0.54, 0.54}, 0.54 * std::sqrt(3) - 1, {1, 1, 1}},
+                               {{-0.6, 0.7, 0}, std::hypot(0.6, 0.7) - 1, {-0.6, 0.7, 0}}}});
   shapes.push_back(
       {.name = "cylinder",
        .mesh = test::cylinder(0.5, 1, 96),
@@ -82,19 +122,30 @@ std::vector<Shape> make_shapes() {
        .volume_m3 = pi / 2,
        .most_union = 1.25,
        .inside_m = {{}, {0.47, 0, 0.97}, {0, 0, -0.98}, {0.34, 0.34, 0}},
-       .outside_m = {{0.53, 0, 0}, {0, 0, 1.03}, {0.37, 0.37, 0.5}}});
-  shapes.push_back({.name = "cone",
-                    .mesh = test::cone(0.5, 1, 96),
-                    .depth_m =
-                        [](const Vec3d& p) {
-                          return std::max(-p.z,
-                                          (std::hypot(p.x, p.y) - 0.5 * (1 - p.z)) / std::hypot(1.0, 0.5));
-                        },
-                    .volume_m3 = pi / 12,
-                    .most_parts = 8,
-                    .most_union = 3.6,
-                    .inside_m = {{0, 0, 0.03}, {0.4, 0, 0.05}, {0, 0, 0.9}, {0, 0.2, 0.5}},
-                    .outside_m = {{0, 0, -0.03}, {0, 0, 1.03}, {0.3, 0, 0.5}, {0.5, 0, 0.1}}});
+       .outside_m = {{0.53, 0, 0}, {0, 0, 1.03}, {0.37, 0.37, 0.5}},
+       .places = {{{0.45, 0, 0}, -0.05, {1, 0, 0}},
+                  {{0, -0.4, 0.5}, -0.1, {0, -1, 0}},
+                  {{0.1, 0, 0.95}, -0.05, {0, 0, 1}},
+                  {{0, 0.2, -0.9}, -0.1, {0, 0, -1}}}});
+  shapes.push_back(
+      {.name = "cone",
+       .mesh = test::cone(0.5, 1, 96),
+       .depth_m =
+           [](const Vec3d& p) {
+             return std::max(-p.z, (std::hypot(p.x, p.y) - 0.5 * (1 - p.z)) / std::hypot(1.0, 0.5));
+           },
+       .volume_m3 = pi / 12,
+       .most_parts = 8,
+       .most_union = 3.6,
+       .inside_m = {{0, 0, 0.03}, {0.4, 0, 0.05}, {0, 0, 0.9}, {0, 0.2, 0.5}},
+       .outside_m = {{0, 0, -0.03}, {0, 0, 1.03}, {0.3, 0, 0.5}, {0.5, 0, 0.1}},
+       .places = {on_cone(0.5, 0, 0.05),
+                  on_cone(0.4, 2, 0.05),
+                  on_cone(0.7, -1, 0.02),
+                  {{0.1, 0, 0.05}, -0.05, {0, 0, -1}}},
+       // measured: 0.0056 R_max in layer 2, which knows three of the four, 2.3 degrees in layer 3
+       .layer_2 = {0.01, 2 * kDegree, true},
+       .layer_3 = {0.0015, 5 * kDegree}});
   shapes.push_back(
       {.name = "l_shape",
        .mesh = test::l_shape(2, 0.5),
@@ -108,7 +159,12 @@ std::vector<Shape> make_shapes() {
        .most_parts = 4,
        .most_union = 1.4,
        .inside_m = {{0.1, 0.1, 0}, {1.95, 0.25, 0}, {0.25, 1.95, 0}, {0.45, 0.45, 0.2}, {1, 0.47, 0}},
-       .outside_m = {{0.55, 0.55, 0}, {1, 0.55, 0}, {2.05, 0.25, 0}, {0.25, 1, 0.3}}});
+       .outside_m = {{0.55, 0.55, 0}, {1, 0.55, 0}, {2.05, 0.25, 0}, {0.25, 1, 0.3}},
+       .places = {{{1.5, 0.05, 0}, -0.05, {0, -1, 0}},
+                  {{1.5, 0.25, 0.2}, -0.05, {0, 0, 1}},
+                  {{0.05, 1.2, 0}, -0.05, {-1, 0, 0}},
+                  {{1.2, 0.46, 0}, -0.04, {0, 1, 0}},
+                  {{0.46, 1.3, 0}, -0.04, {1, 0, 0}}}});
   shapes.push_back(
       {.name = "torus",
        .mesh = test::torus(1, 0.3, 64, 32),
@@ -118,7 +174,14 @@ std::vector<Shape> make_shapes() {
        .most_parts = 8,
        .most_union = 1.9,
        .inside_m = {{1, 0, 0}, {-1, 0, 0.27}, {0, 0.73, 0}, {0, -1.27, 0}, {0.707, 0.707, -0.27}},
-       .outside_m = {{}, {0, 0, 0.1}, {0.66, 0, 0}, {0, 1.34, 0}, {-1, 0, 0.34}}});
+       .outside_m = {{}, {0, 0, 0.1}, {0.66, 0, 0}, {0, 1.34, 0}, {-1, 0, 0.34}},
+       .places = {{{1.25, 0, 0}, -0.05, {1, 0, 0}},
+                  {{0, 0.75, 0}, -0.05, {0, -1, 0}},
+                  {{std::sqrt(0.5), std::sqrt(0.5), -0.2}, -0.1, {0, 0, -1}},
+                  {{-1, 0, 0.25}, -0.05, {0, 0, 1}}},
+       // measured: 5.6 degrees in both layers, 0.0054 R_max in layer 3; layer 2 knows one of the four
+       .layer_2 = {0.002, 10 * kDegree, true},
+       .layer_3 = {0.01, 10 * kDegree}});
   shapes.push_back(
       {.name = "spring",
        .mesh = test::spring(kCoil_m, kWire_m, kPitch_m, kTurns, 40, 32),
@@ -128,8 +191,13 @@ std::vector<Shape> make_shapes() {
        .most_parts = 16,
        .most_union = 2,
        .inside_m = {helix_m(pi / 2), helix_m(pi), helix_m(2 * pi), helix_m(3 * pi), helix_m(3.4 * pi)},
-       .outside_m = {
-           {0, 0, 0.8}, {1, 0, 0.4}, helix_m(pi) + Vec3d{0, 0, 0.4}, helix_m(2 * pi) + Vec3d{0.25, 0, 0}}});
+       .outside_m =
+           {{0, 0, 0.8}, {1, 0, 0.4}, helix_m(pi) + Vec3d{0, 0, 0.4}, helix_m(2 * pi) + Vec3d{0.25, 0, 0}},
+       .places = {on_spring(0.9 * pi, 0.15), on_spring(1.5 * pi, -0.15), on_spring(2.2 * pi, 0.17),
+                  on_spring(3 * pi, -0.16)},
+       // measured: 31 and 42 degrees at one of the four, 5 at the others; 0.020 R_max in layer 2
+       .layer_2 = {0.03, 45 * kDegree, true},
+       .layer_3 = {0.0015, 60 * kDegree}});
   shapes.push_back({.name = "thin_sheet",
                     .mesh = test::thin_sheet(1, 0.02),
                     .depth_m =
@@ -141,7 +209,10 @@ std::vector<Shape> make_shapes() {
                     .most_union = 1.45,
                     .most_wrong = 0.021,  // its rim is as high as two texels
                     .inside_m = {{}, {0.45, 0.45, 0}, {-0.3, 0.1, 0.004}, {0.2, -0.4, -0.004}},
-                    .outside_m = {{0, 0, 0.02}, {0, 0.3, -0.02}, {0.55, 0, 0}}});
+                    .outside_m = {{0, 0, 0.02}, {0, 0.3, -0.02}, {0.55, 0, 0}},
+                    .places = {{{0, 0, 0.005}, -0.005, {0, 0, 1}},
+                               {{0.2, -0.3, -0.008}, -0.002, {0, 0, -1}},
+                               {{-0.3, 0.1, 0.004}, -0.006, {0, 0, 1}}}});
   shapes.push_back(
       {.name = "hollow_box",
        .mesh = test::hollow_box({1, 1, 1}, 0.25),
@@ -153,7 +224,12 @@ std::vector<Shape> make_shapes() {
        .most_parts = 8,
        .most_union = 2.2,
        .inside_m = {{0.87, 0, 0}, {0, -0.87, 0.3}, {0, 0, 0.87}, {0.9, 0.9, 0.9}, {-0.87, 0.7, -0.7}},
-       .outside_m = {{}, {0.6, 0, 0}, {0.6, -0.6, 0.6}, {0, 0, -0.7}, {1.1, 0, 0}}});
+       .outside_m = {{}, {0.6, 0, 0}, {0.6, -0.6, 0.6}, {0, 0, -0.7}, {1.1, 0, 0}},
+       .places = {{{0.95, 0, 0}, -0.05, {1, 0, 0}},
+                  {{0.8, 0.1, -0.2}, -0.05, {-1, 0, 0}},
+                  {{0, -0.97, 0.3}, -0.03, {0, -1, 0}},
+                  {{0.7, 0, 0}, 0.05, {-1, 0, 0}},
+                  {{0, 0.1, 0.72}, 0.03, {0, 0, -1}}}});
   shapes.push_back(
       {.name = "nested_shells",
        .mesh = test::joined({test::sphere(1, 4), test::flipped(test::sphere(0.7, 4)), test::sphere(0.4, 4)}),
@@ -164,7 +240,12 @@ std::vector<Shape> make_shapes() {
        .most_parts = 3,
        .most_union = 1.5,
        .inside_m = {{}, {0.3, 0.1, 0}, {0, 0.85, 0}, {0, 0, -0.95}, {0.5, 0.5, 0.5}},
-       .outside_m = {{0.55, 0, 0}, {0, -0.6, 0}, {0.3, 0.3, 0.35}, {1.05, 0, 0}}});
+       .outside_m = {{0.55, 0, 0}, {0, -0.6, 0}, {0.3, 0.3, 0.35}, {1.05, 0, 0}},
+       .places = {{{0.95, 0, 0}, -0.05, {1, 0, 0}},
+                  {{0, 0.75, 0}, -0.05, {0, -1, 0}},
+                  {{0, 0, -0.36}, -0.04, {0, 0, -1}},
+                  {{0.65, 0, 0}, 0.05, {-1, 0, 0}},
+                  {{0, 0.45, 0}, 0.05, {0, 1, 0}}}});
   shapes.push_back(
       {.name = "touching_boxes",
        .mesh =
@@ -177,7 +258,11 @@ std::vector<Shape> make_shapes() {
        .most_parts = 2,
        .most_union = 1.3,
        .inside_m = {{-0.02, 0, 0}, {0.02, 0.3, -0.3}, {0.97, 0.4, 0.4}, {-0.97, 0, -0.4}, {0.5, 0, 0}},
-       .outside_m = {{1.03, 0, 0}, {-1.03, 0, 0}, {0, 0.53, 0}, {0, 0, -0.53}}});
+       .outside_m = {{1.03, 0, 0}, {-1.03, 0, 0}, {0, 0.53, 0}, {0, 0, -0.53}},
+       .places = {{{0.95, 0, 0}, -0.05, {1, 0, 0}},
+                  {{-0.5, 0.45, 0}, -0.05, {0, 1, 0}},
+                  {{0.5, 0.1, -0.46}, -0.04, {0, 0, -1}},
+                  {{-0.96, 0.2, 0.1}, -0.04, {-1, 0, 0}}}});
   return shapes;
 }
 
@@ -201,6 +286,25 @@ bool any_holds(const Asset& asset, const Vec3d& p_m) {
   return std::ranges::any_of(asset.parts, [&](const Part& part) { return holds(part, p_m); });
 }
 
+void expect_places(const Shape& shape, const Asset& asset, const runtime::Object& object) {
+  for (const runtime::Layer layer : {runtime::Layer::kTwo, runtime::Layer::kThree}) {
+    const Closeness& limit = layer == runtime::Layer::kTwo ? shape.layer_2 : shape.layer_3;
+    for (const Place& place : shape.places) {
+      SCOPED_TRACE("layer " + std::to_string(static_cast<int>(layer)) + " at " + std::to_string(place.p_m.x) +
+                   " " + std::to_string(place.p_m.y) + " " + std::to_string(place.p_m.z));
+      const runtime::Answer answer = object.query(cast<float>(place.p_m), {layer});
+      EXPECT_EQ(answer.inside, place.depth_m < 0);
+      if (std::isnan(answer.signed_distance_m)) {
+        EXPECT_TRUE(limit.may_be_unknown);
+        continue;
+      }
+      EXPECT_NEAR(answer.signed_distance_m, place.depth_m, limit.depth * asset.r_max_m);
+      const double cosine = dot(cast<double>(answer.normal), normalized(place.normal));
+      EXPECT_LE(std::acos(std::clamp(cosine, -1.0, 1.0)), limit.angle_rad);
+    }
+  }
+}
+
 class SimpleShape : public testing::TestWithParam<int> {};
 
 TEST_P(SimpleShape, StaysExact) {
@@ -213,6 +317,7 @@ TEST_P(SimpleShape, StaysExact) {
   const auto object = runtime::Object::build(asset);
   ASSERT_TRUE(object.ok()) << object.error().finding;
 
+  expect_places(shape, asset, object.value());
   EXPECT_GE(asset.parts.size(), shape.least_parts);
   EXPECT_LE(asset.parts.size(), shape.most_parts);
   EXPECT_NEAR(asset.mesh.volume_m3, shape.volume_m3, 0.015 * shape.volume_m3);
