@@ -162,6 +162,7 @@ HWY_NOINLINE void Answerer::second_layer() noexcept {
       hn::StoreU(look.foot_row, kD, entries_.other_row + i);
       hn::StoreU(look.foot_col, kD, entries_.other_col + i);
     }
+    if (part.bound_cells > 0) prove(resident_, part, range, entries_);
   }
 }
 

@@ -13,6 +13,7 @@
 
 #include "sqmap/asset/shape_table.hpp"
 
+#include "certainty.hpp"
 #include "powers.hpp"
 #include "resident.hpp"
 #include "triangle.hpp"
@@ -185,6 +186,11 @@ inline ChartAnswer Chart::look(const Vec3f& p, bool third, std::uint32_t level, 
   const std::uint32_t stride = part_.stride_at(level);
   const Foot<float> foot = table_.foot(p);
   ChartAnswer answer = second_layer(p, foot, stride);
+  // What the bounds prove leaves no doubt.
+  if (const Certainty told = told_by(resident_, part_, p); told != Certainty::kUnsure) {
+    answer.inside = told == Certainty::kInside;
+    answer.certainty = std::numeric_limits<float>::infinity();
+  }
   if (third) {
     // The search goes downhill only, so it begins where it is nearer. Points outside the mesh, the most of
     // those that touch nothing, do with the foot; an inner point needs a distance, or it would feel no force.

@@ -56,6 +56,8 @@ namespace hn = hwy::HWY_NAMESPACE;
 //
 #include "cull.inl"
 //
+#include "bounds.inl"
+//
 #include "batch.inl"
 //
 #include "body.inl"

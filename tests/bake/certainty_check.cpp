@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // certainty_check BUNDLE.h5 MESH COUNT: asks a conservative bundle for the certainty of COUNT points of each
 // kind and compares with winding numbers of the mesh. Exit code 1 where a sure answer is wrong by more than
-// the bundle's tolerance, 2 where the files cannot be used. scripts/check_certainty runs it on the samples.
+// the bundle's tolerance or layers 2 and 3 contradict one, 2 where the files cannot be used.
+// scripts/check_certainty runs it on the samples.
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
@@ -56,10 +57,10 @@ int check(const std::filesystem::path& bundle, const std::filesystem::path& mesh
   std::size_t wrong = 0;
   for (const Kind& kind : kinds) {
     const test::CertaintyCount found = test::count_certainty(object.value(), oracle, kind.points);
-    std::printf("%-14s %-15s %9zu %9zu %9zu %8.2f %6zu %12.2e %12.2e\n", source.value().name.c_str(),
+    std::printf("%-14s %-15s %9zu %9zu %9zu %8.2f %6zu %12.2e %12.2e %12zu\n", source.value().name.c_str(),
                 kind.name, found.points, found.outside, found.inside, 100 * found.sure_share(), found.wrong,
-                found.worst_m / r_max_m, tolerance_m / r_max_m);
-    wrong += found.wrong;
+                found.worst_m / r_max_m, tolerance_m / r_max_m, found.contradicted);
+    wrong += found.wrong + found.contradicted;
   }
   return wrong == 0 ? 0 : 1;
 }

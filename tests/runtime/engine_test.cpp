@@ -9,6 +9,8 @@
 #include <gtest/gtest.h>
 
 #include "sqmap/asset/shape_table.hpp"
+#include "sqmap/runtime/body.hpp"
+#include "sqmap/runtime/contact.hpp"
 #include "sqmap/runtime/object.hpp"
 
 #include "chart.hpp"
@@ -86,6 +88,61 @@ TEST_P(EveryTarget, AnswersLikeTheSinglePointToTheLastBit) {
         EXPECT_GT(nowhere, 100);
         EXPECT_EQ(known > 1000, layer != Layer::kOne) << known;
       }
+    }
+  }
+}
+
+/// Bounds that know nothing of the maps: whatever a cell is sure of, about half of its places contradict
+/// them. One part has none.
+Asset with_adverse_bounds(Asset asset) {
+  std::mt19937_64 rng(31);
+  const auto byte = [&](unsigned least, unsigned most) {
+    return static_cast<std::uint8_t>(least + rng() % (most - least + 1));
+  };
+  for (std::size_t k = 1; k < asset.parts.size(); ++k) {
+    SurfaceBounds& bounds = asset.parts[k].bounds;
+    bounds.cells = static_cast<std::uint32_t>(2 * k + 1);
+    bounds.tolerance_m = 1e-6;
+    for (std::uint32_t cell = 0; cell < 6 * bounds.cells * bounds.cells; ++cell)
+      bounds.cell.push_back(
+          {byte(96, 160), byte(96, 160), byte(120, 255), byte(60, 120), byte(0, 60), byte(0, 3)});
+  }
+  return asset;
+}
+
+TEST_P(EveryTarget, NeverContradictsASureAnswer) {
+  const Asset asset = with_adverse_bounds(test::mixed_asset());
+  const Object object = built(asset), bare = built(test::mixed_asset());
+  const std::vector<Vec3f> points = test::points_around(asset, 4000, 32);
+  const PointBody body = PointBody::build(points).value();
+  std::vector<Certainty> told(points.size());
+  object.certainty(points, told);
+  Batch batch(points.size());
+  std::vector<Contact> contacts(points.size());
+  for (const Layer layer : {Layer::kTwo, Layer::kThree, Layer::kAuto}) {
+    for (const std::uint32_t level : {0U, 1U}) {
+      const QueryOptions options{layer, level};
+      object.query(points, batch.answers(), options);
+      int differing = 0, sure = 0, contradicted = 0, otherwise = 0, distances = 0;
+      std::size_t touching = 0;
+      for (std::size_t i = 0; i < points.size(); ++i) {
+        const Answer one = object.query(points[i], options);
+        differing += !batch.holds(i, one);
+        touching += one.inside;
+        ASSERT_FALSE(one.inside ? one.signed_distance_m > 0 : one.signed_distance_m < 0);
+        if (told[i] == Certainty::kUnsure || one.part == kNowhere) continue;
+        ++sure;
+        contradicted += one.inside != (told[i] == Certainty::kInside);
+        otherwise += one.inside != bare.query(points[i], options).inside;
+        distances += !std::isnan(one.signed_distance_m);
+      }
+      SCOPED_TRACE("layer " + std::to_string(int(layer)) + ", level " + std::to_string(level));
+      EXPECT_EQ(differing, 0);
+      EXPECT_EQ(contradicted, 0);
+      EXPECT_EQ(object.contacts(body, {}, contacts, {options}), touching);
+      EXPECT_GT(sure, 1000);
+      EXPECT_GT(otherwise, sure / 4) << "the bounds no longer contradict the maps";
+      EXPECT_GT(distances, sure / 2);
     }
   }
 }

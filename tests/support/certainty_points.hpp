@@ -107,6 +107,7 @@ struct CertaintyCount {
   std::size_t points{}, outside{}, inside{};  ///< of the points, those told so
   std::size_t wrong{};                        ///< told one side and deeper in the other than the tolerance
   double worst_m{};                           ///< deepest of what was told the wrong side
+  std::size_t contradicted{};                 ///< told surely, and otherwise by query() in layer 2 or 3
   double sure_share() const { return static_cast<double>(outside + inside) / static_cast<double>(points); }
 };
 
@@ -116,9 +117,18 @@ inline CertaintyCount count_certainty(const runtime::Object& object, const bake:
   using runtime::Certainty;
   std::vector<Certainty> told(points.size());
   std::vector<double> wrong_by_m(points.size(), -1);
+  std::vector<std::uint8_t> is_contradicted(points.size()), is_inside(points.size());
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, points.size(), 1024), [&](const auto& range) {
     const auto first = range.begin(), size = range.size();
-    object.certainty(std::span(points).subspan(first, size), std::span(told).subspan(first, size));
+    const auto asked = std::span(points).subspan(first, size);
+    object.certainty(asked, std::span(told).subspan(first, size));
+    for (const auto layer : {runtime::Layer::kTwo, runtime::Layer::kThree}) {
+      object.query(asked, {.inside = std::span(is_inside).subspan(first, size)}, {layer});
+      for (std::size_t i = first; i < first + size; ++i) {
+        const auto wrong_side = is_inside[i] != 0 ? Certainty::kOutside : Certainty::kInside;
+        if (told[i] == wrong_side) is_contradicted[i] = 1;
+      }
+    }
     for (std::size_t i = first; i < first + size; ++i) {
       if (told[i] == Certainty::kUnsure) continue;
       const Vec3d p_m = cast<double>(points[i]);
@@ -131,6 +141,7 @@ inline CertaintyCount count_certainty(const runtime::Object& object, const bake:
   for (std::size_t i = 0; i < points.size(); ++i) {
     count.outside += told[i] == Certainty::kOutside;
     count.inside += told[i] == Certainty::kInside;
+    count.contradicted += is_contradicted[i];
     if (wrong_by_m[i] < 0) continue;
     count.worst_m = std::max(count.worst_m, wrong_by_m[i]);
     if (!(wrong_by_m[i] <= object.certainty_tolerance_m())) ++count.wrong;  // NaN: wrong

@@ -50,6 +50,7 @@ struct Answer {
   Vec3f surface_m;  ///< the point of the surface that signed_distance_m speaks of; zero where unknown
   std::uint32_t part = kNowhere;  ///< part that answered; kNowhere: outside every superquadric
   Layer layer = Layer::kAuto;     ///< layer that answered; kAuto: none, the bounding spheres or a NaN input
+  /// In layers 2 and 3 never other than what Object::certainty is sure of.
   bool inside = false;
 };
 
@@ -109,6 +110,7 @@ class Object {
              const QueryOptions& options = {}) const noexcept;
 
   /// What the bounds of a conservative bake prove of points, object frame [m]. Same answers one at a time.
+  /// query() in layers 2 and 3 asks them too: where they are sure, they decide the side.
   /// Precondition: `told` is as long as the points. Bounded time, no allocation.
   void certainty(std::span<const Vec3f> points_m, std::span<Certainty> told) const noexcept;
   Certainty certainty(const Vec3f& p_m) const noexcept;
