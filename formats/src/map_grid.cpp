@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "sqmap/asset/map_grid.hpp"
 
+#include <array>
 #include <cassert>
 #include <numbers>
 
@@ -11,6 +12,25 @@ namespace {
 // Samples of the curve whose chords stand for its arc length. Stored maps depend on it (FORMAT.md S6): a
 // change is a major format step.
 constexpr int kArcSamples = 2048;
+
+double angle_rad(double sample) { return sample * (std::numbers::pi / 2) / kArcSamples; }
+
+/// Directions of the samples; the same for every curve.
+struct Directions {
+  std::array<double, kArcSamples + 1> cosine, sine;
+
+  static const Directions& all() {
+    static const Directions directions = [] {
+      Directions d;
+      for (int k = 0; k <= kArcSamples; ++k) {
+        d.cosine[k] = k == kArcSamples ? 0 : std::cos(angle_rad(k));
+        d.sine[k] = std::sin(angle_rad(k));
+      }
+      return d;
+    }();
+    return directions;
+  }
+};
 
 SuperellipsePoint<double> mirrored(SuperellipsePoint<double> p, bool flip_c, bool flip_s) noexcept {
   if (flip_c) {
@@ -29,13 +49,13 @@ SuperellipsePoint<double> mirrored(SuperellipsePoint<double> p, bool flip_c, boo
 std::vector<SuperellipsePoint<double>> quadrant_nodes(double alpha_m, double beta_m, double e,
                                                       std::uint32_t cells) {
   assert(alpha_m > 0 && beta_m > 0 && cells >= 1);
-  const auto angle_at = [](double sample) { return sample * (std::numbers::pi / 2) / kArcSamples; };
+  const Directions& directions = Directions::all();
   std::vector<double> length(kArcSamples + 1);
   double c = alpha_m, s = 0;
   for (int k = 1; k <= kArcSamples; ++k) {
-    const double cosine = k == kArcSamples ? 0 : std::cos(angle_at(k));
-    const double n = superellipse_norm<double>(cosine, std::sin(angle_at(k)), e);
-    const double next_c = alpha_m * cosine / n, next_s = beta_m * std::sin(angle_at(k)) / n;
+    const double cosine = directions.cosine[k], sine = directions.sine[k];
+    const double n = superellipse_norm<double>(cosine, sine, e);
+    const double next_c = alpha_m * cosine / n, next_s = beta_m * sine / n;
     length[k] = length[k - 1] + std::hypot(next_c - c, next_s - s);
     c = next_c;
     s = next_s;
@@ -49,7 +69,7 @@ std::vector<SuperellipsePoint<double>> quadrant_nodes(double alpha_m, double bet
     const double target = length.back() * k / cells;
     while (length[sample + 1] < target) ++sample;
     const double step = length[sample + 1] - length[sample];
-    const double angle = angle_at(sample + (step > 0 ? (target - length[sample]) / step : 0));
+    const double angle = angle_rad(sample + (step > 0 ? (target - length[sample]) / step : 0));
     nodes[k] = superellipse_point<double>(std::cos(angle), std::sin(angle), e);
   }
   return nodes;
