@@ -102,7 +102,13 @@ void pack_differences(const double* sums, double unit, std::uint16_t* out) {
   }
 }
 
-CurveUnits put_curve(Layout& out, const CurveTable<double>& curve) {
+/// A curve as the object holds it.
+struct StoredCurve {
+  PackedCurve packed;
+  CurveUnits units;
+};
+
+StoredCurve pack(const CurveTable<double>& curve) {
   double c_fallen[kCells + 1], c_fall = 0, s_rise = 0, c_step = 0, s_step = 0;
   for (int k = 0; k <= kCells; ++k) {
     c_fallen[kCells - k] = curve.c[k];  // from the end, where c is exactly 0
@@ -113,16 +119,24 @@ CurveUnits put_curve(Layout& out, const CurveTable<double>& curve) {
     s_rise = std::max(s_rise, curve.s[k] - curve.s[k - 1]);
   }
   const CurveUnits units{unit_for(c_fall), unit_for(s_rise), unit_for(c_step), unit_for(s_step)};
-  PackedCurve result;
+  PackedCurve result{};
   pack_differences(c_fallen, double{units.c}, result.c_fall);
   pack_differences(curve.s, double{units.s}, result.s_rise);
   for (int k = 0; k <= kCells; ++k) {
     result.c_step[k] = packed(-curve.c_step[k], double{units.c_step});
     result.s_step[k] = packed(curve.s_step[k], double{units.s_step});
   }
-  out.put(result);
-  return units;
+  return {result, units};
 }
+
+/// The curves of a part, which cost more than all else that is laid out.
+struct Curves {
+  explicit Curves(const Superquadric& shape)
+      : eta(pack(CurveTable<double>::of(std::sqrt(shape.semi_axes_m.x * shape.semi_axes_m.y),
+                                        shape.semi_axes_m.z, shape.e1))),
+        omega(pack(CurveTable<double>::of(shape.semi_axes_m.x, shape.semi_axes_m.y, shape.e2))) {}
+  StoredCurve eta, omega;
+};
 
 void unpack_curve(const PackedCurve& curve, const CurveUnits& units, CurveTable<float>& out) noexcept {
   // Sums first, then loops that the compiler turns into vectors.
@@ -149,7 +163,7 @@ float square_of_ball(const BoundingSphere& sphere, double units_per_m) {
   return rounded_up(radius * radius);
 }
 
-PartRecord put_part(Layout& out, const Part& part, double units_per_m) {
+PartRecord put_part(Layout& out, const Part& part, const Curves& curves, double units_per_m) {
   const DistanceMap& map = part.map;
   PartRecord record;
   record.semi_axes = cast<float>(units_per_m * part.shape.semi_axes_m);
@@ -176,9 +190,10 @@ PartRecord put_part(Layout& out, const Part& part, double units_per_m) {
   record.texel_bits = static_cast<std::uint8_t>(map.bits + (has_seam ? 1 : 0));
 
   record.curves_at = out.at();
-  const Vec3d& a = part.shape.semi_axes_m;
-  record.eta_units = put_curve(out, CurveTable<double>::of(std::sqrt(a.x * a.y), a.z, part.shape.e1));
-  record.omega_units = put_curve(out, CurveTable<double>::of(a.x, a.y, part.shape.e2));
+  out.put(curves.eta.packed);
+  out.put(curves.omega.packed);
+  record.eta_units = curves.eta.units;
+  record.omega_units = curves.omega.units;
 
   record.bound_cells = static_cast<std::uint8_t>(part.bounds.cells);
   out.put(part.bounds.cell.data(), part.bounds.cell.size() * sizeof(BoundCell));
@@ -245,10 +260,12 @@ Resident::Resident(const Asset& asset) : part_count_(static_cast<std::uint32_t>(
   sphere_radius_ = rounded_up(units_per_m * asset.sphere.radius_m);
   sphere_square_ = square_of_ball(asset.sphere, units_per_m);
   const std::vector<PartRecord> blank(part_count_);
+  std::vector<Curves> curves;
+  for (const Part& part : asset.parts) curves.emplace_back(part.shape);
   const auto lay_out = [&](Layout& out) {
     out.put(blank.data(), blank.size() * sizeof(PartRecord));
     for (std::uint32_t k = 0; k < part_count_; ++k) {
-      const PartRecord record = put_part(out, asset.parts[k], units_per_m);
+      const PartRecord record = put_part(out, asset.parts[k], curves[k], units_per_m);
       if (bytes_) std::memcpy(bytes_.get() + k * sizeof(PartRecord), &record, sizeof record);
     }
     out.put(std::uint32_t{0});
