@@ -8,6 +8,7 @@
 #include <tuple>
 
 #include <tbb/parallel_for.h>
+#include <tbb/parallel_invoke.h>
 
 #include "measure.hpp"
 #include "part_builder.hpp"
@@ -235,12 +236,13 @@ class Refiner {
     const Cell& whole = pieces[k].cell;
     Cell first{{}, whole.segment, CutReason::kErrorTarget}, second = first;
     std::tie(first.solid, second.solid) = set_.split(whole.solid, (*pieces[k].cuts)[which]);
-    auto a = draft_piece(set_, std::move(first), queries_, options_.fit);
-    auto b = draft_piece(set_, std::move(second), queries_, options_.fit);
-    if (!a) return a.error();
-    if (!b) return b.error();
-    pieces[k] = std::move(a).value();
-    pieces.push_back(std::move(b).value());
+    std::optional<Result<Piece>> a, b;
+    tbb::parallel_invoke([&] { a = draft_piece(set_, std::move(first), queries_, options_.fit); },
+                         [&] { b = draft_piece(set_, std::move(second), queries_, options_.fit); });
+    if (!*a) return a->error();
+    if (!*b) return b->error();
+    pieces[k] = std::move(*a).value();
+    pieces.push_back(std::move(*b).value());
     return judge_pieces();
   }
 
