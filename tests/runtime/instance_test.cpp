@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "sqmap/runtime/instance.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <numbers>
@@ -9,6 +10,10 @@
 #include <vector>
 
 #include <gtest/gtest.h>
+
+#include "sqmap/runtime/body.hpp"
+#include "sqmap/runtime/budget.hpp"
+#include "sqmap/runtime/contact.hpp"
 
 #include "support/analytic_asset.hpp"
 
@@ -206,6 +211,120 @@ TEST(Instance, ThousandsShareOneObject) {
     EXPECT_EQ(&crowd[static_cast<std::size_t>(i)].object(), &ball());
     EXPECT_TRUE(crowd[static_cast<std::size_t>(i)].query({4.0F * static_cast<float>(i), 0, 0}).inside);
   }
+}
+
+/// A hand-like cloud about the origin: every contact of it is known from its points one by one.
+std::vector<Vec3f> cloud(std::size_t count) {
+  std::mt19937_64 rng(7);
+  std::uniform_real_distribution<double> radius(0.1, 0.5);
+  std::vector<Vec3f> points;
+  while (points.size() < count) points.push_back(cast<float>(radius(rng) * random_direction(rng)));
+  return points;
+}
+
+/// Placements of an instance and of a body near its surface, mirrored or not in all four ways.
+struct Meeting {
+  Placement object, body;
+};
+std::vector<Meeting> meetings() {
+  std::mt19937_64 rng(11);
+  std::uniform_real_distribution<double> log_scale(-2, 2);
+  std::vector<Meeting> result;
+  for (int i = 0; i < 40; ++i) {
+    const double s = std::exp(log_scale(rng));
+    const Placement object{{random_turn(rng), 3.0 * random_direction(rng)}, s, i % 2 == 1};
+    Vec3d centre = kCentre;
+    if (object.mirrored) centre.x = -centre.x;
+    const Pose& pose = object.world_from_object;
+    const Vec3d surface_m =
+        pose.translation_m + s * (rotation(pose.orientation).apply(centre) + kRadius * random_direction(rng));
+    result.push_back({object, {{random_turn(rng), surface_m}, 0.7 * s, i % 4 >= 2}});
+  }
+  return result;
+}
+
+Vec3f in_world(const Placement& placement, Vec3f p) {
+  if (placement.mirrored) p.x = -p.x;
+  return cast<float>(placement.scale *
+                         rotation(placement.world_from_object.orientation).apply(cast<double>(p)) +
+                     placement.world_from_object.translation_m);
+}
+
+TEST(Instance, AnswersABodyLikeItsPointsOneByOne) {
+  const std::vector<Vec3f> points = cloud(500);
+  const PointBody body = std::move(PointBody::build(points)).value();
+  std::vector<float> distance(points.size());
+  std::vector<Vec3f> normal(points.size()), surface(points.size());
+  std::vector<std::uint8_t> inside(points.size());
+  int known = 0, unknown = 0;
+  for (const Meeting& meeting : meetings()) {
+    const Instance instance = placed(meeting.object);
+    const auto s = static_cast<float>(meeting.object.scale);
+    instance.query(body, meeting.body,
+                   {.signed_distance_m = distance, .normal = normal, .surface_m = surface, .inside = inside},
+                   {Layer::kThree});
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      const Answer one = instance.query(in_world(meeting.body, points[i]), {Layer::kThree});
+      if (std::isnan(one.signed_distance_m) || std::isnan(distance[i])) {
+        unknown += std::isnan(distance[i]) ? 1 : 0;
+        continue;
+      }
+      ++known;
+      EXPECT_NEAR(distance[i], one.signed_distance_m, 1e-4F * s);
+      EXPECT_GT(dot(normal[i], one.normal), 0.99F);
+      EXPECT_LT(norm(surface[i] - one.surface_m), 2e-3F * s);
+      if (std::abs(distance[i]) > 1e-3F * s) {
+        EXPECT_EQ(inside[i] != 0, one.inside);
+      }
+    }
+  }
+  EXPECT_GT(known, 5000);
+  EXPECT_GT(unknown, 100);
+}
+
+TEST(Instance, FindsTheContactsOfABodyHoweverEitherIsTurnedScaledAndMirrored) {
+  const std::vector<Vec3f> points = cloud(500);
+  const PointBody body = std::move(PointBody::build(points)).value();
+  std::vector<Contact> contacts(points.size()), one(1);
+  std::size_t all = 0;
+  for (const Meeting& meeting : meetings()) {
+    const Instance instance = placed(meeting.object);
+    const auto s = static_cast<float>(meeting.object.scale);
+    std::size_t surely = 0, perhaps = 0;
+    float deepest_m = 0;
+    for (const Vec3f& p : points) {
+      const float depth_m = -instance.query(in_world(meeting.body, p), {Layer::kThree}).signed_distance_m;
+      surely += depth_m > 1e-4F * s ? 1 : 0;
+      perhaps += depth_m > -1e-4F * s ? 1 : 0;
+      deepest_m = std::max(deepest_m, depth_m);  // NaN: as it was
+    }
+    const std::size_t found = instance.contacts(body, meeting.body, contacts, {{Layer::kThree}});
+    EXPECT_GE(found, surely);
+    EXPECT_LE(found, perhaps);
+    for (std::size_t k = 0; k < found; ++k) {
+      const Contact& contact = contacts[k];
+      EXPECT_LT(norm(contact.position_m - in_world(meeting.body, points[contact.point])), 1e-5F * s + 1e-5F);
+      EXPECT_NEAR(norm(contact.surface_m - contact.position_m), contact.depth_m, 1e-3F * s);
+    }
+    EXPECT_EQ(instance.contacts(body, meeting.body, one, {{Layer::kThree}, 0, Seek::kDeepest}),
+              found > 0 ? 1U : 0U);
+    if (found > 0) {
+      EXPECT_NEAR(one[0].depth_m, deepest_m, 1e-4F * s);
+    }
+    EXPECT_EQ(instance.contacts(body, meeting.body, one, {{Layer::kThree}, 0, Seek::kAny}),
+              found > 0 ? 1U : 0U);
+    WorkBudget ample{1000000}, scarce{0};
+    EXPECT_EQ(instance.contacts(body, meeting.body, contacts, {{Layer::kThree}}, ample), found);
+    EXPECT_EQ(ample.layer, Layer::kThree);
+    instance.contacts(body, meeting.body, contacts, {{Layer::kThree}}, scarce);
+    EXPECT_EQ(scarce.layer, Layer::kOne);
+    EXPECT_LT(scarce.spent, ample.spent);
+    all += found;
+  }
+  EXPECT_GT(all, 2000U);
+  Placement nowhere;
+  nowhere.world_from_object.translation_m.x = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_EQ(placed({}).contacts(body, nowhere, contacts, {}), 0U);
 }
 
 }  // namespace

@@ -9,6 +9,8 @@
 
 #include <gtest/gtest.h>
 
+#include "sqmap/runtime/body.hpp"
+#include "sqmap/runtime/budget.hpp"
 #include "sqmap/runtime/contacts.hpp"
 #include "sqmap/runtime/instance.hpp"
 #include "sqmap/runtime/sweep.hpp"
@@ -93,6 +95,51 @@ TEST(NoAllocation, InQueriesContactsAndSweeps) {
   }
   EXPECT_GT(found, 100U);
   EXPECT_GT(swept, 100U);
+}
+
+TEST(NoAllocation, InQuestionsAboutBodies) {
+  const Scene scene;
+  const std::vector<Vec3f> points = cloud(scene.at({}), 1000);
+  std::vector<Vec3f> moved(points), broken(points);
+  for (Vec3f& p : moved) p.x += 0.01F;
+  broken[500].y = kNan;
+  PointBody body = std::move(PointBody::build(points)).value();
+  const BodyPlacement placement{{{0.9, 0.1, -0.2, 0.3}, {0.1, 0, 0}}, 0.9};
+  const Placement in_world{{{0.9, 0.1, -0.2, 0.3}, {0.1, 0, 0}}, 0.9};
+  const Instance upright = scene.at({0.2, 0, 0}), mirrored = scene.at({0.2, 0, 0}, 1.1, true);
+  std::vector<float> distance(points.size());
+  std::vector<Vec3f> normal(points.size()), surface(points.size());
+  std::vector<std::uint32_t> part(points.size());
+  std::vector<std::uint8_t> layer(points.size()), inside(points.size());
+  std::vector<Contact> contacts(points.size());
+  std::size_t found = 0, refitted = 0;
+  std::uint64_t spent = 0;
+  {
+    const test::NoAllocation guard;
+    WorkRate rate;
+    for (const Layer which : {Layer::kAuto, Layer::kOne, Layer::kTwo, Layer::kThree}) {
+      refitted += body.refit(which == Layer::kTwo ? points : moved);
+      refitted += body.refit(broken);
+      scene.object.query(body, placement, {distance, normal, surface, part, layer, inside}, {which});
+      for (const Seek seek : {Seek::kAll, Seek::kAny, Seek::kDeepest}) {
+        const ContactQuery query{{which}, 0.01F, seek};
+        found += scene.object.contacts(body, placement, contacts, query);
+        WorkBudget budget{rate.units_for(100)};
+        found += scene.object.contacts(body, placement, contacts, query, budget);
+        for (const Instance& instance : {upright, mirrored}) {
+          found += instance.contacts(body, in_world, contacts, query);
+          found += instance.contacts(body, in_world, contacts, query, budget);
+        }
+        rate.learn(budget.spent, 100);
+        spent += budget.spent;
+      }
+      for (const Instance& instance : {upright, mirrored})
+        instance.query(body, in_world, {distance, normal, surface, part, layer, inside}, {which});
+    }
+  }
+  EXPECT_EQ(refitted, 4U);
+  EXPECT_GT(found, 100U);
+  EXPECT_GT(spent, 1000U);
 }
 
 TEST(NoAllocation, TheGuardEndsAProgramThatAllocates) {

@@ -58,8 +58,24 @@ class Instance {
   void query(std::span<const Vec3f> points_m, const Answers& answers,
              const QueryOptions& options = {}) const noexcept;
 
+  /// The points of a body that stands in the world, answers by the body's indices; as Object::query(body).
+  /// Blocks that touch no part cost next to nothing. Where either is mirrored and the other is not, blocks
+  /// are dropped by the object's sphere alone.
+  void query(const PointBody& body, const Placement& world_from_body, const Answers& answers,
+             const QueryOptions& options = {}) const noexcept;
+  /// As Object::contacts, world frame; query.within_m is in world metres. A contact without a depth has the
+  /// point itself as its surface_m, as in sqmap/runtime/contacts.hpp. A placement of the body that is not
+  /// finite finds nothing. No allocation.
+  std::size_t contacts(const PointBody& body, const Placement& world_from_body, std::span<Contact> contacts,
+                       const ContactQuery& query) const noexcept;
+  /// The same within a budget. Where either is mirrored and the other is not, a point counts once however
+  /// many superquadrics hold it.
+  std::size_t contacts(const PointBody& body, const Placement& world_from_body, std::span<Contact> contacts,
+                       const ContactQuery& query, WorkBudget& budget) const noexcept;
+
   /// As Object::certainty, world frame. It is told of the points as to_object() gives them.
   void certainty(std::span<const Vec3f> points_m, std::span<Certainty> told) const noexcept;
+  Certainty certainty(const Vec3f& p_m) const noexcept { return object_->certainty(to_object(p_m)); }
 
   const Object& object() const noexcept { return *object_; }
   float scale() const noexcept { return scale_; }
@@ -84,6 +100,8 @@ class Instance {
  private:
   Instance(const Object& object, const Rotation<float>& orientation, const Vec3d& translation_m,
            double scale) noexcept;
+  std::size_t contacts_of(const PointBody& body, const Placement& world_from_body,
+                          std::span<Contact> contacts, ContactQuery query, WorkBudget* budget) const noexcept;
 
   const Object* object_;
   Vec3d translation_m_;
