@@ -132,6 +132,9 @@ std::size_t Object::contacts(const PointBody& body, const BodyPlacement& placeme
 }
 
 std::size_t Object::part_count() const noexcept { return impl_->resident.part_count(); }
+Layer Object::layer_of(std::uint32_t part, const QueryOptions& options) const noexcept {
+  return layer_for(impl_->resident.part(part), options);
+}
 std::uint32_t Object::level_count() const noexcept { return impl_->level_count; }
 const BoundingSphere& Object::sphere() const noexcept { return impl_->sphere; }
 double Object::r_max_m() const noexcept { return impl_->r_max_m; }

@@ -24,13 +24,16 @@ struct Body {
   std::optional<Instance> scaled;  ///< of the object in the own frame; none in layer 1
   float scale;
   bool mirrored;
-  Rotation<double> world_from_body;
+  Quaternion orientation;
+  Rotation<double> world_from_body;  ///< the same
   Vec3d translation_m;
   Vec3f centre_m;  ///< of the bounding sphere, own frame
   float radius_m;
   std::vector<Stage> stages;  ///< effects on contacts, with a memory for this body
   std::vector<Contact> contacts;
   std::size_t contact_count{};
+  Vec3d probe_m{};    ///< where the probe's origin is in this frame, own frame
+  bool is_reached{};  ///< by the probe's ball in this frame
 };
 
 /// A double rounded to float may fall short of itself by less than this.
@@ -42,6 +45,12 @@ bool is_finite(const Vec3d& v) noexcept {
 bool is_finite(const Pose& pose) noexcept {
   const Quaternion& q = pose.orientation;
   return is_finite(pose.translation_m) && std::isfinite(q.w + q.x + q.y + q.z);
+}
+
+/// The turn that takes b's frame to a's: a^-1 b.
+Quaternion relative(const Quaternion& a, const Quaternion& b) noexcept {
+  return {a.w * b.w + a.x * b.x + a.y * b.y + a.z * b.z, a.w * b.x - a.x * b.w - a.y * b.z + a.z * b.y,
+          a.w * b.y + a.x * b.z - a.y * b.w - a.z * b.x, a.w * b.z - a.x * b.y + a.y * b.x - a.z * b.w};
 }
 
 Outcome check(const Probe& probe) {
@@ -63,20 +72,25 @@ Outcome check(const Probe& probe) {
 
 struct Scene::Impl {
   Probe probe;
-  float probe_radius_m{};  ///< around the probe's origin
+  std::optional<PointBody> blocks;  ///< the probe's points; none in layer 1
+  float probe_radius_m{};           ///< around the probe's origin
   QueryOptions query;
   std::vector<std::unique_ptr<Object>> objects;  ///< one an asset, where instances find it; empty in layer 1
   std::vector<std::vector<Shape>> shapes;        ///< the same, layer 1 only
   std::vector<Body> bodies;
   std::vector<Stage> total_stages;  ///< effects on the total
-  std::vector<Vec3f> points_m;      ///< of the probe, in the frame of the body at hand
+  std::vector<Vec3f> points_m;      ///< of the probe, in the frame of the body at hand; layer 1 only
   std::vector<Vec3f> force_n;
   std::size_t part_count{};
 
   Outcome add_asset(const Asset& asset);
   Outcome add_body(const SceneObject& object, std::size_t asset, const SceneOptions& options);
-  void touch(Body& body, BodyState state, FrameResult& result) noexcept;
-  std::uint32_t count_inside(const Body& body, bool& finite) const noexcept;
+  /// Finds the bodies that the probe reaches. @return how many
+  std::size_t reach(const Pose& world_from_probe) noexcept;
+  FrameResult frame(const Pose& world_from_probe, const Vec3d& about_m, float step_s,
+                    WorkBudget* budget) noexcept;
+  void touch(Body& body, const BodyState& state, FrameResult& result) noexcept;
+  std::uint32_t count_inside(const Body& body, const Pose& body_from_probe, bool& finite) noexcept;
 };
 
 Scene::Scene(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
@@ -121,8 +135,9 @@ Outcome Scene::Impl::add_body(const SceneObject& object, std::size_t asset, cons
   if (placement.mirrored) centre_m.x = -centre_m.x;
   bodies.push_back(
       {asset, scaled, static_cast<float>(placement.scale), placement.mirrored,
-       rotation(placement.world_from_object.orientation), placement.world_from_object.translation_m,
-       cast<float>(centre_m), static_cast<float>(placement.scale * object.asset->sphere.radius_m * kWiden),
+       placement.world_from_object.orientation, rotation(placement.world_from_object.orientation),
+       placement.world_from_object.translation_m, cast<float>(centre_m),
+       static_cast<float>(placement.scale * object.asset->sphere.radius_m * kWiden),
        std::move(stages).value(), std::vector<Contact>(objects.empty() ? 0 : probe.points_m.size())});
   part_count += object.asset->parts.size();
   return Done{};
@@ -160,12 +175,22 @@ Result<Scene> Scene::build(std::span<const SceneObject> objects, Probe probe, co
   if (!stages) return stages.error();
   impl->total_stages = std::move(stages).value();
   std::erase_if(impl->total_stages, [](const Stage& stage) { return stage.limit == nullptr; });
-  impl->points_m.resize(impl->probe.points_m.size());
-  if (!impl->objects.empty()) impl->force_n.resize(impl->probe.points_m.size());
+  if (options.query.layer == Layer::kOne) {
+    impl->points_m.resize(impl->probe.points_m.size());
+    return Scene(std::move(impl));
+  }
+  Result<PointBody> blocks = PointBody::build(impl->probe.points_m);
+  if (!blocks) return blocks.error();
+  impl->blocks.emplace(std::move(blocks).value());
+  impl->force_n.resize(impl->probe.points_m.size());
   return Scene(std::move(impl));
 }
 
-std::uint32_t Scene::Impl::count_inside(const Body& body, bool& finite) const noexcept {
+std::uint32_t Scene::Impl::count_inside(const Body& body, const Pose& body_from_probe,
+                                        bool& finite) noexcept {
+  const auto turn = rotation<float>(body_from_probe.orientation);
+  const Vec3f origin_m = cast<float>(body_from_probe.translation_m);
+  for (std::size_t i = 0; i < points_m.size(); ++i) points_m[i] = turn.apply(probe.points_m[i]) + origin_m;
   std::uint32_t count = 0;
   const float shrink = 1 / body.scale;
   for (const Vec3f& p : points_m) {
@@ -179,11 +204,12 @@ std::uint32_t Scene::Impl::count_inside(const Body& body, bool& finite) const no
   return count;
 }
 
-void Scene::Impl::touch(Body& body, BodyState state, FrameResult& result) noexcept {
-  state.points_m = points_m;
-  state.weight_m2 = probe.weight_m2;
-  const Field field{&*body.scaled, query};
-  const Found found = find_touches(field, points_m, body.contacts);
+void Scene::Impl::touch(Body& body, const BodyState& state, FrameResult& result) noexcept {
+  Field field{&*body.scaled, query};
+  const Found found = find_touches(field, state, body.contacts);
+  // What effects ask besides must not be deeper than what was afforded.
+  const Layer asked = query.layer == Layer::kAuto ? Layer::kThree : query.layer;
+  if (state.budget != nullptr && state.budget->layer < asked) field.options.layer = state.budget->layer;
   body.contact_count = found.count;
   Touches touches{field, state, std::span(body.contacts).first(found.count),
                   std::span(force_n).first(found.count)};
@@ -195,7 +221,7 @@ void Scene::Impl::touch(Body& body, BodyState state, FrameResult& result) noexce
     if (stage.sum != nullptr) stage.sum(stage.effect.get(), touches, wrench);
 
   if (result.layer == Layer::kAuto && found.count > 0)
-    result.layer = body.scaled->query(body.contacts[0].position_m, query).layer;
+    result.layer = body.scaled->object().layer_of(body.contacts[0].part, field.options);
   result.inside += static_cast<std::uint32_t>(found.count);
   result.wrench.contacts += static_cast<std::uint32_t>(found.count);
   result.wrench.is_finite = result.wrench.is_finite && wrench.is_finite && found.is_finite;
@@ -206,37 +232,65 @@ void Scene::Impl::touch(Body& body, BodyState state, FrameResult& result) noexce
   result.wrench.torque_nm = result.wrench.torque_nm + to_world(wrench.torque_nm);
 }
 
-FrameResult Scene::frame(const Pose& world_from_probe, const Vec3d& about_m, float step_s) noexcept {
-  Impl& s = *impl_;
+std::size_t Scene::Impl::reach(const Pose& world_from_probe) noexcept {
+  std::size_t count = 0;
+  for (Body& body : bodies) {
+    body.contact_count = 0;
+    body.probe_m = body.world_from_body.apply_inverse(world_from_probe.translation_m - body.translation_m);
+    body.is_reached =
+        norm(cast<float>(body.probe_m) - body.centre_m) <= probe_radius_m + body.radius_m;  // NaN: no
+    count += body.is_reached ? 1 : 0;
+  }
+  return count;
+}
+
+FrameResult Scene::Impl::frame(const Pose& world_from_probe, const Vec3d& about_m, float step_s,
+                               WorkBudget* budget) noexcept {
   FrameResult result;
   const bool finite = is_finite(world_from_probe) && is_finite(about_m);
-  const Rotation<double> turn = rotation(world_from_probe.orientation);
-  for (Body& body : s.bodies) {
-    body.contact_count = 0;
-    if (!finite) continue;
-    const auto to_body = [&](const Vec3d& p) { return body.world_from_body.apply_inverse(p); };
-    const Vec3f origin_m = cast<float>(to_body(world_from_probe.translation_m - body.translation_m));
-    if (!(norm(origin_m - body.centre_m) <= s.probe_radius_m + body.radius_m)) continue;
-    Rotation<float> body_from_probe;  // rows: images of the body's axes in the probe's frame
-    for (int axis = 0; axis < 3; ++axis) {
-      const Vec3d unit{axis == 0 ? 1.0 : 0.0, axis == 1 ? 1.0 : 0.0, axis == 2 ? 1.0 : 0.0};
-      body_from_probe.row[static_cast<std::size_t>(axis)] =
-          cast<float>(turn.apply_inverse(body.world_from_body.apply(unit)));
-    }
-    for (std::size_t i = 0; i < s.points_m.size(); ++i)
-      s.points_m[i] = body_from_probe.apply(s.probe.points_m[i]) + origin_m;
-    if (s.objects.empty()) {
-      result.inside += s.count_inside(body, result.wrench.is_finite);
+  std::size_t left = reach(world_from_probe);
+  if (!finite) left = 0;
+  if (budget != nullptr) {
+    budget->spent = 0;
+    budget->layer = Layer::kAuto;
+  }
+  for (Body& body : bodies) {
+    if (!finite || !body.is_reached) continue;
+    const Pose body_from_probe{relative(body.orientation, world_from_probe.orientation), body.probe_m};
+    if (objects.empty()) {
+      result.inside += count_inside(body, body_from_probe, result.wrench.is_finite);
       result.layer = Layer::kOne;
-    } else {
-      s.touch(body, {{}, {}, cast<float>(to_body(about_m - body.translation_m)), step_s}, result);
+      continue;
     }
+    WorkBudget share;
+    if (budget != nullptr) share.units = (budget->units - std::min(budget->spent, budget->units)) / left--;
+    BodyState state;
+    state.weight_m2 = probe.weight_m2;
+    state.about_m = cast<float>(body.world_from_body.apply_inverse(about_m - body.translation_m));
+    state.step_s = step_s;
+    state.body = &*blocks;
+    state.at = {body_from_probe};
+    state.budget = budget != nullptr ? &share : nullptr;
+    touch(body, state, result);
+    if (budget == nullptr) continue;
+    budget->spent += share.spent;
+    budget->level = share.level;
+    if (budget->layer == Layer::kAuto || share.layer < budget->layer) budget->layer = share.layer;
   }
   result.wrench.is_finite = result.wrench.is_finite && finite;
   result.wrench = finite_or_zero(result.wrench);
-  for (const Stage& stage : s.total_stages) stage.limit(stage.effect.get(), step_s, result.wrench);
+  for (const Stage& stage : total_stages) stage.limit(stage.effect.get(), step_s, result.wrench);
   if (!result.wrench.is_finite) result.wrench.force_n = result.wrench.torque_nm = {};
   return result;
+}
+
+FrameResult Scene::frame(const Pose& world_from_probe, const Vec3d& about_m, float step_s) noexcept {
+  return impl_->frame(world_from_probe, about_m, step_s, nullptr);
+}
+
+FrameResult Scene::frame(const Pose& world_from_probe, const Vec3d& about_m, float step_s,
+                         WorkBudget& budget) noexcept {
+  return impl_->frame(world_from_probe, about_m, step_s, &budget);
 }
 
 std::span<const Contact> Scene::contacts(std::size_t object) const noexcept {
@@ -256,6 +310,7 @@ std::size_t Scene::resident_bytes() const noexcept {
   std::size_t bytes = sizeof(Scene) + sizeof(Impl) + stages_bytes(s.total_stages);
   bytes += (s.points_m.capacity() + s.force_n.capacity() + s.probe.points_m.capacity()) * sizeof(Vec3f);
   bytes += s.probe.weight_m2.capacity() * sizeof(float) + s.probe.zone.capacity() * sizeof(std::uint32_t);
+  if (s.blocks) bytes += s.blocks->resident_bytes();
   for (const auto& object : s.objects) bytes += object->resident_bytes();
   for (const auto& shapes : s.shapes) bytes += sizeof(std::vector<Shape>) + shapes.capacity() * sizeof(Shape);
   for (const Body& body : s.bodies)

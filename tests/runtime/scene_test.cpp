@@ -3,6 +3,9 @@
 
 #include <cmath>
 #include <limits>
+#include <span>
+#include <utility>
+#include <vector>
 
 #include <gtest/gtest.h>
 #include <sys/prctl.h>
@@ -10,6 +13,8 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include "sqmap/runtime/body.hpp"
+#include "sqmap/runtime/budget.hpp"
 #include "sqmap/runtime/effects/force_model.hpp"
 #include "sqmap/runtime/effects/friction.hpp"
 #include "sqmap/runtime/effects/reaction.hpp"
@@ -57,14 +62,89 @@ TEST(Scene, EqualsTheModelComposedAtCompileTime) {
   friction.coefficient = 0.7F;
   ForceModel model(Reaction{}, friction);
   ASSERT_TRUE(model.prepare(points.size()).ok());
+  const Result<PointBody> body = PointBody::build(points);
   for (int frame = 0; frame < 50; ++frame) {
     const Vec3d p = test::kBallCentre_m + Vec3d{0.002 * frame, 0, 0.95};
-    std::vector<Vec3f> moved;
-    for (const Vec3f& q : points) moved.push_back(q + cast<float>(p));
-    const Vec3f expected = model.frame({&instance.value(), {Layer::kThree}}, {moved}).force_n;
+    BodyState state;
+    state.body = &body.value();
+    state.at = {at(p)};
+    const Vec3f expected = model.frame({&instance.value(), {Layer::kThree}}, state).force_n;
     ASSERT_EQ(scene.frame(at(p), {}, 1e-3F).wrench.force_n, expected);
     ASSERT_GT(norm(expected), 1);
   }
+}
+
+// The blocks of the probe are culled and answered together; asked point by point, in the world instead of the
+// object's frame, the forces are the same but for rounding.
+TEST(Scene, ForcesAreThoseOfThePointsOneByOne) {
+  constexpr float kStiffness_n_per_m = 500;
+  const auto points = test::sphere_points(700, 0.3, {0.1, 0.2, -0.1});
+  const std::vector<Placement> placements{{{{0.9, 0.1, -0.3, 0.2}, {-1, 0.5, 0}}, 0.8},
+                                          {{{0.2, 0.7, 0.1, -0.4}, {1, 0, 0.3}}, 1.3, true}};
+  std::vector<SceneObject> objects;
+  for (const Placement& placement : placements) objects.push_back({&ball_asset(), placement});
+  Scene scene = built(objects, {points}, with({{"reaction", {{"stiffness_n_per_m", kStiffness_n_per_m}}}}));
+  const Result<Object> object = Object::build(ball_asset());
+  std::size_t touching = 0;
+  for (int frame = 0; frame < 60; ++frame) {
+    const double turn = 0.1 * frame;
+    const Pose pose{{std::cos(turn), 0.3, std::sin(turn), 0},
+                    {0.09 * (frame - 30), 0.3 * std::sin(turn), 0.1}};
+    const Rotation<double> rotated = rotation(pose.orientation);
+    Vec3d expected_n;
+    double sum_n = 0;
+    std::size_t expected = 0;
+    for (const Placement& placement : placements) {
+      const Result<Instance> instance = Instance::place(object.value(), placement);
+      for (const Vec3f& q : points) {
+        const Vec3f p = cast<float>(rotated.apply(cast<double>(q)) + pose.translation_m);
+        const Answer answer = instance.value().query(p, {Layer::kThree});
+        if (!(answer.signed_distance_m < 0)) continue;
+        const double push_n = kStiffness_n_per_m * -static_cast<double>(answer.signed_distance_m);
+        expected_n = expected_n + push_n * cast<double>(answer.normal);
+        sum_n += push_n;
+        ++expected;
+      }
+    }
+    const FrameResult result = scene.frame(pose, {}, 1e-3F);
+    // A point within rounding of the surface, or between two facets, may be answered either way.
+    EXPECT_NEAR(static_cast<double>(result.inside), static_cast<double>(expected), 2);
+    EXPECT_LT(norm(cast<double>(result.wrench.force_n) - expected_n), 1e-3 * sum_n + 1e-3);
+    touching += expected > 0 ? 1 : 0;
+  }
+  EXPECT_GT(touching, 20U);
+  EXPECT_LT(touching, 60U);
+}
+
+// Objects out of reach spend nothing; the others share what there is, and what they had to do with is told.
+TEST(Scene, StaysWithinItsBudgetAndSaysWhichLayerItAfforded) {
+  const auto points = test::sphere_points(2000, 0.3, {});
+  const std::vector<SceneObject> objects{{&ball_asset(), {at({-1.0, 0, 0})}},
+                                         {&ball_asset(), {at({1.0, 0, 0})}},
+                                         {&ball_asset(), {at({9.0, 0, 0})}}};
+  Scene scene = built(objects, {points}, with({{"reaction", {}}}));
+  const Pose middle = at(test::kBallCentre_m);
+  const FrameResult free = scene.frame(middle, {}, 1e-3F);
+  WorkBudget ample{1000000};
+  const FrameResult deep = scene.frame(middle, {}, 1e-3F, ample);
+  EXPECT_EQ(deep.wrench.force_n, free.wrench.force_n);
+  EXPECT_EQ(ample.layer, Layer::kThree);
+  EXPECT_GT(ample.spent, 1000U);
+  std::uint64_t last = ample.spent + 1;
+  for (const auto& [share, layer] : {std::pair{1.0, Layer::kThree}, {0.6, Layer::kTwo}, {0.3, Layer::kOne}}) {
+    WorkBudget budget{static_cast<std::uint64_t>(share * static_cast<double>(ample.spent))};
+    const FrameResult result = scene.frame(middle, {}, 1e-3F, budget);
+    EXPECT_EQ(budget.layer, layer) << share;
+    EXPECT_LE(budget.spent, budget.units);
+    EXPECT_LT(budget.spent, last);
+    last = budget.spent;
+    EXPECT_EQ(result.layer, layer);
+    EXPECT_EQ(norm(result.wrench.force_n) > 0, layer != Layer::kOne);
+  }
+  WorkBudget away{1};
+  scene.frame(at({0, 50, 0}), {}, 1e-3F, away);
+  EXPECT_EQ(away.spent, 0U);
+  EXPECT_EQ(away.layer, Layer::kAuto);
 }
 
 TEST(Scene, ForceTurnsAndGrowsWithTheObject) {
@@ -158,7 +238,12 @@ TEST(Scene, APoseThatIsNotFiniteGivesZeroForceAndAFlag) {
 void run_frames(Scene& scene, int count) {
   for (int frame = 0; frame < count; ++frame) {
     const double turn = 0.01 * frame;
-    scene.frame(at(test::kBallCentre_m + 0.97 * Vec3d{std::cos(turn), std::sin(turn), 0}), {}, 1e-3F);
+    const Pose pose = at(test::kBallCentre_m + 0.97 * Vec3d{std::cos(turn), std::sin(turn), 0});
+    WorkBudget budget{500};
+    if (frame % 3 == 0)
+      scene.frame(pose, {}, 1e-3F, budget);
+    else
+      scene.frame(pose, {}, 1e-3F);
   }
 }
 
@@ -168,11 +253,23 @@ TEST(Scene, FramesAllocateNothing) {
   run_frames(scene, 200);
 }
 
+void ask_about_a_body(const Object& object, PointBody& body, std::span<const Vec3f> points_m,
+                      std::span<Contact> room) {
+  WorkBudget budget{1000};
+  const bool ok = body.refit(points_m) && object.contacts(body, {}, room, {}) > 0 &&
+                  object.contacts(body, {}, room, {}, budget) > 0;
+  if (!ok) syscall(SYS_exit, 78);
+}
+
 TEST(Scene, FramesCallNoSystem) {
 #if defined(__SANITIZE_THREAD__) || defined(__SANITIZE_ADDRESS__)
   GTEST_SKIP() << "the sanitizer's own run-time calls the system";
 #endif
   Scene scene = built({{&ball_asset(), {}}}, {test::sphere_points(300, 0.2, {})}, with(all_effects()));
+  const Result<Object> object = Object::build(ball_asset());
+  const std::vector<Vec3f> moved = test::sphere_points(300, 0.2, test::kBallCentre_m + Vec3d{0.9, 0, 0});
+  Result<PointBody> body = PointBody::build(test::sphere_points(300, 0.2, {}));
+  std::vector<Contact> room(moved.size());
   const pid_t child = fork();
   ASSERT_GE(child, 0);
   if (child == 0) {
@@ -180,6 +277,7 @@ TEST(Scene, FramesCallNoSystem) {
     constexpr int kStrict = 1;
     if (prctl(PR_SET_SECCOMP, kStrict) != 0) syscall(SYS_exit, 77);
     run_frames(scene, 200);
+    ask_about_a_body(object.value(), body.value(), moved, room);
     syscall(SYS_exit, 0);
   }
   int status = 0;

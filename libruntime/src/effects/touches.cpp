@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "sqmap/runtime/effects/touches.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <string>
@@ -14,6 +15,12 @@ bool is_finite(const Vec3f& v) noexcept {
   return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
 }
 
+bool is_finite(const Placement& placement) noexcept {
+  const Quaternion& q = placement.world_from_object.orientation;
+  const Vec3d& t_m = placement.world_from_object.translation_m;
+  return std::isfinite(q.w + q.x + q.y + q.z + placement.scale) && std::isfinite(t_m.x + t_m.y + t_m.z);
+}
+
 /// Shortest decimal text of a float that a message needs.
 std::string text_of(float value) {
   char text[32];
@@ -23,10 +30,20 @@ std::string text_of(float value) {
 
 }  // namespace
 
-Found find_touches(const Field& field, std::span<const Vec3f> points_m, std::span<Contact> room) noexcept {
+Found find_touches(const Field& field, const BodyState& body, std::span<Contact> room) noexcept {
   Found found;
-  for (const Vec3f& p : points_m) found.is_finite = found.is_finite && is_finite(p);
-  found.count = all_contacts(*field.instance, points_m, room, field.options).written;
+  if (body.body == nullptr) {
+    for (const Vec3f& p : body.points_m) found.is_finite = found.is_finite && is_finite(p);
+    found.count = all_contacts(*field.instance, body.points_m, room, field.options).written;
+    return found;
+  }
+  found.is_finite = is_finite(body.at);
+  if (!found.is_finite) return found;
+  const ContactQuery query{field.options};
+  const std::size_t count = body.budget != nullptr
+                                ? field.instance->contacts(*body.body, body.at, room, query, *body.budget)
+                                : field.instance->contacts(*body.body, body.at, room, query);
+  found.count = std::min(count, room.size());
   return found;
 }
 

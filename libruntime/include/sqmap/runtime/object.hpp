@@ -136,6 +136,9 @@ class Object {
                        const ContactQuery& query, WorkBudget& budget) const noexcept;
 
   std::size_t part_count() const noexcept;
+  /// The layer that options.layer, which may be kAuto, comes to for one part. Precondition: there is the
+  /// part.
+  Layer layer_of(std::uint32_t part, const QueryOptions& options) const noexcept;
   std::uint32_t level_count() const noexcept;     ///< of the part that has most
   const BoundingSphere& sphere() const noexcept;  ///< object frame
   double r_max_m() const noexcept;

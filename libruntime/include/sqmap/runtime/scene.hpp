@@ -59,15 +59,16 @@ struct SceneOptions {
 struct FrameResult {
   Wrench wrench;               ///< on the probe
   std::uint32_t inside{};      ///< layer 1: points inside a superquadric; else the contacts
-  Layer layer = Layer::kAuto;  ///< that answered for the first contact; kAuto: there is none
+  Layer layer = Layer::kAuto;  ///< of the part of the first contact; kAuto: there is none
 };
 
 /// Objects, one probe and the effects between them. frame() changes the effects' memory, so one thread at a
 /// time may use a scene.
 class Scene {
  public:
-  /// Errors: kInvalidAsset; kBadOption for an effect or parameter that does not exist or is out of range, one
-  /// that needs another, a transform that is not finite, or a probe whose arrays differ in length.
+  /// Errors: kInvalidAsset; kInvalidMesh for a probe with a point that is not finite; kBadOption for an
+  /// effect or parameter that does not exist or is out of range, one that needs another, a transform that is
+  /// not finite, or a probe whose arrays differ in length.
   static Result<Scene> build(std::span<const SceneObject> objects, Probe probe, const SceneOptions& options);
   ~Scene();
   Scene(Scene&&) noexcept;
@@ -76,6 +77,13 @@ class Scene {
   /// @param about_m  point the torque is about, world frame
   /// No allocation, lock, log or system call. A pose that is not finite gives zero force and a flag.
   FrameResult frame(const Pose& world_from_probe, const Vec3d& about_m, float step_s) noexcept;
+  /// The same within budget.units for all objects: each in the probe's reach has an equal share of what is
+  /// left, and what it does not spend goes to the next. One that affords no more than layer 1 has contacts
+  /// without depth, hence no force. `budget.layer` becomes the least that any of them had to do with, kAuto
+  /// where none was reached. What effects ask beyond the contacts (smoothing, tracking) is not counted, but a
+  /// WorkRate learns of it by the time of the frame.
+  FrameResult frame(const Pose& world_from_probe, const Vec3d& about_m, float step_s,
+                    WorkBudget& budget) noexcept;
 
   /// Contacts of the last frame with one instance, in that instance's frame (scale applied), after the
   /// effects that change them.

@@ -36,7 +36,8 @@ concept RemembersPoints = requires(E e) {
 ///
 ///     ForceModel model(Reaction{.stiffness_n_per_m = 800}, ForceLimit{});
 ///     if (auto ok = model.prepare(points.size()); !ok) ...
-///     const Wrench wrench = model.frame({&instance}, {points_m});
+///     const Wrench wrench = model.frame({&instance}, {points_m});      // or, of a PointBody that moves,
+///     const Wrench wrench = model.frame({&instance}, {.body = &body, .at = {world_from_body}});
 ///
 /// One body against one instance; a frame allocates nothing. For several objects or effects chosen at run
 /// time: Scene.
@@ -62,7 +63,7 @@ class ForceModel {
 
   /// Queries the points and returns the total force. prepare() was called with at least as many points.
   Wrench frame(const Field& field, const BodyState& body) noexcept {
-    const Found found = find_touches(field, body.points_m, contacts_);
+    const Found found = find_touches(field, body, contacts_);
     Touches touches{field, body, std::span(contacts_).first(found.count),
                     std::span(force_n_).first(found.count)};
     const Wrench wrench = apply(touches);

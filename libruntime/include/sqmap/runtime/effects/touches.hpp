@@ -16,6 +16,8 @@
 #include <span>
 
 #include "sqmap/asset/result.hpp"
+#include "sqmap/runtime/body.hpp"
+#include "sqmap/runtime/budget.hpp"
 #include "sqmap/runtime/contact.hpp"
 #include "sqmap/runtime/instance.hpp"
 
@@ -28,19 +30,25 @@ struct Field {
   QueryOptions options;
 };
 
-/// Where B is in this frame, A's frame. The spans belong to the caller.
+/// Where B is in this frame, A's frame. What is pointed to belongs to the caller.
 struct BodyState {
   std::span<const Vec3f> points_m;
   std::span<const float> weight_m2{};  ///< surface that each point stands for; empty: all the same
   Vec3f about_m{};                     ///< point the torque is about: where the device holds B
   float step_s = 1e-3F;                ///< since the frame before
+  /// The points in blocks, and where the body stands in A's frame; points_m is then not read and may be
+  /// empty. Blocks far from A cost next to nothing, so this is the way for a body of more than a few dozen
+  /// points.
+  const PointBody* body = nullptr;
+  Placement at{};
+  WorkBudget* budget = nullptr;  ///< of find_touches, only with `body`; null: as deep as Field::options asks
 };
 
 /// One frame of B against A.
 struct Touches {
   Field field;
   BodyState body;
-  std::span<Contact> contacts;  ///< ascending by point
+  std::span<Contact> contacts;  ///< of different points, in an order that is the same every time
   std::span<Vec3f> force_n;     ///< on B at each contact; as long as `contacts`
 };
 
@@ -55,12 +63,12 @@ struct Wrench {
 /// What find_touches came upon.
 struct Found {
   std::size_t count{};    ///< contacts written
-  bool is_finite = true;  ///< false: a point was not finite; such points do not touch
+  bool is_finite = true;  ///< false: a point, or the body's place, was not finite; such points do not touch
 };
 
-/// all_contacts(), those without a depth among them: they push nothing, but Tracking can give them one. Where
+/// All contacts, those without a depth among them: they push nothing, but Tracking can give them one. Where
 /// `room` is shorter than the points, the last contacts may be left out.
-Found find_touches(const Field& field, std::span<const Vec3f> points_m, std::span<Contact> room) noexcept;
+Found find_touches(const Field& field, const BodyState& body, std::span<Contact> room) noexcept;
 
 /// Sum of the forces. A sum that is not finite becomes zero and is flagged.
 Wrench total(const Touches& touches) noexcept;
