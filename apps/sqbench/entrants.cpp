@@ -6,6 +6,7 @@
 #include "peer.hpp"
 #include "peer_hulls.hpp"
 #include "peer_nanovdb.hpp"
+#include "peer_openvdb.hpp"
 
 namespace sqmap::bench {
 namespace {
@@ -50,9 +51,14 @@ Entrant adf_entrant(unsigned resolution, double bound_percent) {
 }
 
 Entrant nanovdb_entrant(NanovdbCode code, unsigned resolution) {
-  const char* kind = code == NanovdbCode::kFloat ? "float" : "8bit";
+  const char* kind = code == NanovdbCode::kFloat ? "float" : code == NanovdbCode::k16Bit ? "16bit" : "8bit";
   return {fmt::format("nanovdb-{}-{}", kind, resolution), fmt::format("nanovdb-{}", kind),
           [=](const Model& model) { return make_nanovdb(model, code, resolution); }, resolution};
+}
+
+Entrant openvdb_entrant(unsigned resolution) {
+  return {fmt::format("openvdb-float-{}", resolution), "openvdb-float",
+          [=](const Model& model) { return make_openvdb(model, resolution); }, resolution};
 }
 
 Entrant hulls_entrant(unsigned hulls) {
@@ -75,6 +81,7 @@ std::vector<Entrant> frame_entrants(bool smoke) {
   for (const unsigned resolution : {64U, 128U}) entrants.push_back(bricks_entrant(resolution));
   entrants.push_back(nanovdb_entrant(NanovdbCode::kFloat, 128));
   entrants.push_back(nanovdb_entrant(NanovdbCode::k8Bit, 128));
+  entrants.push_back(openvdb_entrant(128));
   entrants.push_back(adf_entrant(128, 0.1));
   if (!smoke) entrants.push_back(adf_entrant(256, 0.05));
   entrants.push_back(hulls_entrant(16));
@@ -99,7 +106,9 @@ std::vector<Entrant> accuracy_entrants(const Model& model, bool smoke) {
     entrants.push_back(bricks_entrant(resolution));
     if (resolution < 64) continue;  // the levels above its leaves make a coarse tree larger than a dense grid
     entrants.push_back(nanovdb_entrant(NanovdbCode::kFloat, resolution));
+    entrants.push_back(nanovdb_entrant(NanovdbCode::k16Bit, resolution));
     entrants.push_back(nanovdb_entrant(NanovdbCode::k8Bit, resolution));
+    entrants.push_back(openvdb_entrant(resolution));
   }
   entrants.push_back(grid_entrant(GridCode::kInt16SimdCulled, 128));
   entrants.push_back(grid_entrant(GridCode::kFloatScalar, 128));

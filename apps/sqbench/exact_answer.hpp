@@ -3,6 +3,9 @@
 // What the peers that know the nearest triangle share.
 #pragma once
 
+#include <algorithm>
+#include <cstddef>
+
 #include "cloud.hpp"
 #include "model.hpp"
 #include "peer.hpp"
@@ -24,8 +27,40 @@ class NearBox {
     return p.x >= low_m_.x && p.x <= high_m_.x && p.y >= low_m_.y && p.y <= high_m_.y && p.z >= low_m_.z &&
            p.z <= high_m_.z;
   }
+  /// Calls `answer(index, placed point)` for the points in the box. Blocks whose sphere misses it are left
+  /// out whole; `may_hold(centre, radius)` is asked of those that have a point in it.
+  template <class MayHold, class Answer>
+  void for_each(const Cloud& cloud, const Placement& placement, const MayHold& may_hold,
+                const Answer& answer) const {
+    for (std::size_t block = 0; block < cloud.block_count; ++block) {
+      const Vec3f centre_m =
+          placement.apply({cloud.block_x_m[block], cloud.block_y_m[block], cloud.block_z_m[block]});
+      const float radius_m = cloud.block_radius_m[block];
+      if (!reaches(centre_m, radius_m)) continue;
+      bool is_asked = false;
+      for (std::size_t i = block * kBlock; i < std::min((block + 1) * kBlock, cloud.count); ++i) {
+        const Vec3f p_m = placement.apply(cloud.points_m[i]);
+        if (!holds(p_m)) continue;
+        if (!is_asked && !may_hold(centre_m, radius_m)) break;
+        is_asked = true;
+        answer(i, p_m);
+      }
+    }
+  }
+  template <class Answer>
+  void for_each(const Cloud& cloud, const Placement& placement, const Answer& answer) const {
+    for_each(
+        cloud, placement, [](const Vec3f&, float) { return true; }, answer);
+  }
 
  private:
+  bool reaches(const Vec3f& centre_m, float radius_m) const noexcept {
+    Vec3f off_m;
+    for (int axis = 0; axis < 3; ++axis)
+      off_m[axis] = std::max({0.0F, low_m_[axis] - centre_m[axis], centre_m[axis] - high_m_[axis]});
+    return dot(off_m, off_m) <= radius_m * radius_m;
+  }
+
   Vec3f low_m_, high_m_;
 };
 

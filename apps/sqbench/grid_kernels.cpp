@@ -226,14 +226,49 @@ void dense_int16_culled(const DenseView& grid, const Cloud& cloud, const Placeme
   }
 }
 
-void bricks(const BrickView& grid, const Cloud& cloud, const Placement& placement, Hits& hits) {
-  hits.count = 0;
-  const ToLattice map(placement, grid.origin_m, grid.spacing_m);
+std::size_t near_blocks(const NearView& view, const Cloud& cloud, const Placement& placement,
+                        std::uint32_t* blocks) {
+  const ToLattice map(placement, view.origin_m, view.brick_m);
+  const VF brick_m = hn::Set(kFloats, view.brick_m), gap_m = hn::Mul(brick_m, hn::Set(kFloats, kGapStep));
+  const auto inside = [&](VF u, int axis) HWY_ATTR {  // nearest coordinate of the lattice
+    return hn::Min(hn::Max(u, hn::Zero(kFloats)), hn::Set(kFloats, view.bricks[axis] * 0.999999F));
+  };
+  std::size_t count = 0;
+  for (std::size_t b = 0; b < cloud.block_count; b += hn::Lanes(kFloats)) {
+    const VF x = hn::LoadU(kFloats, cloud.block_x_m.data() + b),
+             y = hn::LoadU(kFloats, cloud.block_y_m.data() + b),
+             z = hn::LoadU(kFloats, cloud.block_z_m.data() + b);
+    // The rounding of coordinates is far below a thousandth of a brick.
+    const VF radius_m =
+        hn::MulAdd(brick_m, hn::Set(kFloats, 1e-3F), hn::LoadU(kFloats, cloud.block_radius_m.data() + b));
+    const VF ux = map.at(0, x, y, z), uy = map.at(1, x, y, z), uz = map.at(2, x, y, z);
+    const VF qx = inside(ux, 0), qy = inside(uy, 1), qz = inside(uz, 2);
+    const VF ox = hn::Sub(ux, qx), oy = hn::Sub(uy, qy), oz = hn::Sub(uz, qz);
+    const VF off_m = hn::Mul(brick_m, hn::Sqrt(hn::MulAdd(ox, ox, hn::MulAdd(oy, oy, hn::Mul(oz, oz)))));
+    MF keep = hn::Le(off_m, radius_m);
+    if (hn::AllFalse(kFloats, keep)) continue;
+    const VI place = hn::Add(hn::ConvertTo(kInts, qx),
+                             hn::Add(hn::Mul(hn::ConvertTo(kInts, qy), hn::Set(kInts, view.row)),
+                                     hn::Mul(hn::ConvertTo(kInts, qz), hn::Set(kInts, view.slab))));
+    const VI gap = hn::And(  // x86 gathers need no alignment
+        hn::GatherOffset(kInts, reinterpret_cast<const std::int32_t*>(view.gap), place), hn::Set(kInts, 255));
+    keep = hn::And(keep, hn::Le(hn::Mul(gap_m, hn::ConvertTo(kFloats, gap)), hn::Add(radius_m, off_m)));
+    if (b + hn::Lanes(kFloats) > cloud.block_count)
+      keep = hn::And(keep, hn::FirstN(kFloats, cloud.block_count - b));
+    count += hn::CompressStore(hn::Iota(kInts, static_cast<std::int32_t>(b)), hn::RebindMask(kInts, keep),
+                               kInts, reinterpret_cast<std::int32_t*>(blocks + count));
+  }
+  return count;
+}
+
+/// As answer_range, of bricks.
+HWY_INLINE void answer_in_bricks(const BrickView& grid, const ToLattice& map, const Cloud& cloud,
+                                 std::size_t begin, std::size_t end, Hits& hits) {
   const VF band = hn::Set(kFloats, grid.band_m);
   constexpr int kShift = 2;  // of a cell to its brick
   static_assert(1 << kShift == kBrickCells);
   const VI within = hn::Set(kInts, kBrickCells - 1);
-  for (std::size_t i = 0; i < cloud.count; i += hn::Lanes(kFloats)) {
+  for (std::size_t i = begin; i < end; i += hn::Lanes(kFloats)) {
     const VF x = hn::LoadU(kFloats, cloud.x_m.data() + i), y = hn::LoadU(kFloats, cloud.y_m.data() + i),
              z = hn::LoadU(kFloats, cloud.z_m.data() + i);
     const Place p = place(map.at(0, x, y, z), map.at(1, x, y, z), map.at(2, x, y, z), grid.cells);
@@ -273,6 +308,16 @@ void bricks(const BrickView& grid, const Cloud& cloud, const Placement& placemen
   }
 }
 
+void bricks(const BrickView& grid, const Cloud& cloud, const Placement& placement, std::uint32_t* blocks,
+            Hits& hits) {
+  hits.count = 0;
+  const ToLattice map(placement, grid.origin_m, grid.spacing_m);
+  const std::size_t count = near_blocks(grid.near, cloud, placement, blocks);
+  for (std::size_t k = 0; k < count; ++k)
+    answer_in_bricks(grid, map, cloud, blocks[k] * kBlock, HWY_MIN((blocks[k] + 1) * kBlock, cloud.count),
+                     hits);
+}
+
 const char* target_name() { return hwy::TargetName(HWY_TARGET); }
 
 }  // namespace
@@ -285,6 +330,7 @@ namespace sqmap::bench {
 HWY_EXPORT(dense_float);
 HWY_EXPORT(dense_int16);
 HWY_EXPORT(dense_int16_culled);
+HWY_EXPORT(near_blocks);
 HWY_EXPORT(bricks);
 HWY_EXPORT(target_name);
 
@@ -298,8 +344,15 @@ void answer_dense_int16_culled(const DenseView& grid, const Cloud& cloud, const 
                                Hits& hits) {
   HWY_DYNAMIC_DISPATCH(dense_int16_culled)(grid, cloud, placement, hits);
 }
-void answer_bricks(const BrickView& grid, const Cloud& cloud, const Placement& placement, Hits& hits) {
-  HWY_DYNAMIC_DISPATCH(bricks)(grid, cloud, placement, hits);
+std::size_t find_near_blocks(const NearView& view, const Cloud& cloud, const Placement& placement,
+                             std::vector<std::uint32_t>& blocks) {
+  blocks.resize(cloud.block_count + kPadding);
+  return HWY_DYNAMIC_DISPATCH(near_blocks)(view, cloud, placement, blocks.data());
+}
+void answer_bricks(const BrickView& grid, const Cloud& cloud, const Placement& placement,
+                   std::vector<std::uint32_t>& blocks, Hits& hits) {
+  blocks.resize(cloud.block_count + kPadding);
+  HWY_DYNAMIC_DISPATCH(bricks)(grid, cloud, placement, blocks.data(), hits);
 }
 const char* instruction_set() { return HWY_DYNAMIC_DISPATCH(target_name)(); }
 

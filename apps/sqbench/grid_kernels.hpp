@@ -5,6 +5,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <vector>
 
 #include "cloud.hpp"
 
@@ -23,6 +24,17 @@ struct DenseView {
   float far_error_m;  ///< what blocks are culled with, as the values beyond the band are not exact
 };
 
+/// Which bricks of a lattice hold anything within the band, for leaving out whole blocks of points.
+struct NearView {
+  const std::uint8_t*
+      gap;        ///< by place: how far every point of the brick is from those, at least, in kGapStep
+  float brick_m;  ///< edge of a brick
+  float bricks[3];
+  std::int32_t row, slab;
+  float origin_m[3];
+};
+inline constexpr float kGapStep = 0.125F;  ///< of a brick
+
 struct BrickView {
   const std::int32_t* brick;    ///< by place: byte offset of the brick's record, negative: nothing near
   const std::uint8_t* records;  ///< per brick: least distance and step as float, then 5^3 codes
@@ -31,6 +43,7 @@ struct BrickView {
   std::int32_t row, slab;  ///< of `brick`
   float origin_m[3];
   float band_m;
+  NearView near;
 };
 inline constexpr int kBrickCells = 4;
 inline constexpr int kBrickNodes = kBrickCells + 1;
@@ -42,7 +55,13 @@ void answer_dense_int16(const DenseView& grid, const Cloud& cloud, const Placeme
 /// The same, and blocks of points are left out where the grid at their centre tells that no point is near.
 void answer_dense_int16_culled(const DenseView& grid, const Cloud& cloud, const Placement& placement,
                                Hits& hits);
-void answer_bricks(const BrickView& grid, const Cloud& cloud, const Placement& placement, Hits& hits);
+/// Indices of the blocks that may reach a brick that holds anything, to `blocks`, which has room for all and
+/// a vector more; returns how many.
+std::size_t find_near_blocks(const NearView& view, const Cloud& cloud, const Placement& placement,
+                             std::vector<std::uint32_t>& blocks);
+/// `blocks`: to work in.
+void answer_bricks(const BrickView& grid, const Cloud& cloud, const Placement& placement,
+                   std::vector<std::uint32_t>& blocks, Hits& hits);
 
 /// The instruction set that the kernels run on, as Highway names it.
 const char* instruction_set();

@@ -280,7 +280,8 @@ std::string results_page(const Results& results, const std::vector<Picture>& pic
       "of the surface; trees of triangles tell the pairs that cross, or whether any do. All methods get the "
       "points "
       "sorted into blocks "
-      "of 32 neighbours. Times are medians; in each repetition all methods take turns, and ratios are formed "
+      "of 32 neighbours. Times are processor time of the one thread, medians; in each repetition all methods "
+      "take turns, and ratios are formed "
       "within a "
       "repetition.");
   if (!pictures.empty()) html += "<h2>Pictures</h2>\n";

@@ -68,7 +68,7 @@ std::unique_ptr<ContactPeer> make_gimpact(const Model& model, const bake::Mesh& 
 std::size_t count_crossing_pairs(const Model& model, const bake::Mesh& probe,
                                  const Placement& object_from_probe);
 
-/// The method that ratios refer to: the strongest rival.
+/// The method that ratios refer to: a plain and strong rival.
 inline constexpr const char* kReference = "grid-int16-128-simd";
 /// The method that the paper's Fig. 11 refers to.
 inline constexpr const char* kTreeReference = "fcl-obb-all-contacts";

@@ -12,6 +12,7 @@
 
 #include "field.hpp"
 #include "peer.hpp"
+#include "trilinear.hpp"
 
 namespace sqmap::bench {
 namespace {
@@ -107,15 +108,8 @@ class DistanceOctree : public Peer {
       if (is_upper) first += kStride[static_cast<std::size_t>(axis)];
     }
     const float* d = leaf.corner->data() + first;
-    const float x00 = d[1] - d[0], x10 = d[4] - d[3], x01 = d[10] - d[9], x11 = d[13] - d[12];
-    const float c00 = d[0] + f.x * x00, c10 = d[3] + f.x * x10, c01 = d[9] + f.x * x01,
-                c11 = d[12] + f.x * x11;
-    const float c0 = c00 + f.y * (c10 - c00), c1 = c01 + f.y * (c11 - c01);
-    const float distance_m = c0 + f.z * (c1 - c0);
-    if (!(distance_m <= band_m_)) return;
-    const float gx0 = x00 + f.y * (x10 - x00), gx1 = x01 + f.y * (x11 - x01);
-    const float gy0 = c10 - c00, gy1 = c11 - c01;
-    hits.add(index, distance_m, normalized(Vec3f{gx0 + f.z * (gx1 - gx0), gy0 + f.z * (gy1 - gy0), c1 - c0}));
+    const Trilinear sample = trilinear({d[0], d[1], d[3], d[4], d[9], d[10], d[12], d[13]}, f);
+    if (sample.value <= band_m_) hits.add(index, sample.value, normalized(sample.gradient));
   }
 
   /// The cube of 2^level cells from `low` on: what a parent stores of it.

@@ -2,7 +2,7 @@
 //
 // Sparse grid: bricks of 4^3 cells where the surface is near, 8 bits a node between the least and the
 // greatest distance of the brick. Nodes on the faces are stored with each brick, so that a query reads one
-// brick only.
+// brick only. Blocks of points that reach no brick are left out first.
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
@@ -11,6 +11,7 @@
 
 #include "field.hpp"
 #include "grid_kernels.hpp"
+#include "near_bricks.hpp"
 #include "peer.hpp"
 
 namespace sqmap::bench {
@@ -44,14 +45,18 @@ class Bricks : public Peer {
     records_.shrink_to_fit();
     view_.brick = places_.data();
     view_.records = records_.data();
+    std::vector<bool> is_near;
+    for (const std::int32_t place : places_) is_near.push_back(place >= 0);
+    near_ = NearBricks(field, kBrickCells, is_near);
+    view_.near = near_.view();
     stated_percent_ = 100 * (kHalfDiagonal * field.spacing_m + 0.5 * widest_m / 255) / model.r_max_m() + 1e-4;
   }
 
   void answer(const Cloud& cloud, const Placement& placement, Hits& hits) const override {
-    answer_bricks(view_, cloud, placement, hits);
+    answer_bricks(view_, cloud, placement, blocks_, hits);
   }
   std::size_t bytes() const override {
-    return sizeof(*this) + places_.capacity() * sizeof(std::int32_t) + records_.capacity();
+    return sizeof(*this) + places_.capacity() * sizeof(std::int32_t) + records_.capacity() + near_.bytes();
   }
   StatedError stated_error() const override { return {stated_percent_, false}; }
   double field_s() const override { return field_s_; }
@@ -84,7 +89,9 @@ class Bricks : public Peer {
 
   std::vector<std::int32_t> places_;
   std::vector<std::uint8_t> records_;
+  NearBricks near_;
   BrickView view_{};
+  mutable std::vector<std::uint32_t> blocks_;  // of the last frame, kept to spare the allocation
   double stated_percent_, field_s_;
 };
 

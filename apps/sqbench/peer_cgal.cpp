@@ -35,20 +35,27 @@ class CgalPeer : public Peer {
 
   void answer(const Cloud& cloud, const Placement& placement, Hits& hits) const override {
     hits.count = 0;
-    for (std::size_t i = 0; i < cloud.count; ++i) {
-      const Vec3f p_m = placement.apply(cloud.points_m[i]);
-      if (!near_.holds(p_m)) continue;
-      const Vec3d p = cast<double>(p_m);
-      const auto [point, primitive] = tree_.closest_point_and_primitive(to_cgal(p));
-      const auto face = static_cast<std::uint32_t>(primitive - triangles_.cbegin());
-      const auto& [a, b, c] = mesh_.faces[face];
-      const OnTriangle there =
-          nearest_on_triangle(p, {mesh_.vertices_m[a], mesh_.vertices_m[b], mesh_.vertices_m[c]});
-      const Vec3d away = p - there.point_m;
-      const Vec3d normal = normals_.at(face, there.feature);
-      if (dot(away, normal) >= 0 && dot(away, away) > band_m_ * band_m_) continue;
-      add_exact(i, p, there.point_m, normal, hits);
-    }
+    typename Tree::Point_and_primitive_id nearest;  // of the block's centre, then of the last point
+    near_.for_each(
+        cloud, placement,
+        [&](const Vec3f& centre_m, float radius_m) {
+          const Kernel::Point_3 centre = to_cgal(cast<double>(centre_m));
+          nearest = tree_.closest_point_and_primitive(centre);
+          const double within_m = band_m_ + double{radius_m};
+          return CGAL::squared_distance(centre, nearest.first) <= within_m * within_m;
+        },
+        [&](std::size_t i, const Vec3f& p_m) {
+          const Vec3d p = cast<double>(p_m);
+          nearest = tree_.closest_point_and_primitive(to_cgal(p), nearest);
+          const auto face = static_cast<std::uint32_t>(nearest.second - triangles_.cbegin());
+          const auto& [a, b, c] = mesh_.faces[face];
+          const OnTriangle there =
+              nearest_on_triangle(p, {mesh_.vertices_m[a], mesh_.vertices_m[b], mesh_.vertices_m[c]});
+          const Vec3d away = p - there.point_m;
+          const Vec3d normal = normals_.at(face, there.feature);
+          if (dot(away, normal) >= 0 && dot(away, away) > band_m_ * band_m_) return;
+          add_exact(i, p, there.point_m, normal, hits);
+        });
   }
   /// The triangles, the nodes (two boxes' worth a triangle) and the points of the search for a first guess.
   std::size_t bytes() const override {

@@ -14,13 +14,16 @@ class EmbreePeer : public Peer {
 
   void answer(const Cloud& cloud, const Placement& placement, Hits& hits) const override {
     hits.count = 0;
-    for (std::size_t i = 0; i < cloud.count; ++i) {
-      const Vec3f p_m = placement.apply(cloud.points_m[i]);
-      if (!near_.holds(p_m)) continue;
-      const Vec3d p = cast<double>(p_m);
-      const auto found = closest_.nearest(p, band_m_);
-      if (found.is_found) add_exact(i, p, found.nearest_m, normals_.at(found.face, found.feature), hits);
-    }
+    near_.for_each(
+        cloud, placement,
+        [&](const Vec3f& centre_m, float radius_m) {  // one search instead of a block's
+          return closest_.nearest(cast<double>(centre_m), band_m_ + double{radius_m}).is_found;
+        },
+        [&](std::size_t i, const Vec3f& p_m) {
+          const Vec3d p = cast<double>(p_m);
+          const auto found = closest_.nearest(p, band_m_);
+          if (found.is_found) add_exact(i, p, found.nearest_m, normals_.at(found.face, found.feature), hits);
+        });
   }
   std::size_t bytes() const override { return sizeof(*this) + closest_.bytes() + normals_.bytes(); }
   StatedError stated_error() const override { return kExactError; }

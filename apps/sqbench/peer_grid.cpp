@@ -10,6 +10,7 @@
 #include "field.hpp"
 #include "grid_kernels.hpp"
 #include "peer.hpp"
+#include "trilinear.hpp"
 
 namespace sqmap::bench {
 namespace {
@@ -83,21 +84,13 @@ class DenseGrid : public Peer {
         continue;
       const auto x = static_cast<std::int32_t>(ux), y = static_cast<std::int32_t>(uy),
                  z = static_cast<std::int32_t>(uz);
-      const float fx = ux - static_cast<float>(x), fy = uy - static_cast<float>(y),
-                  fz = uz - static_cast<float>(z);
+      const Vec3f at{ux - static_cast<float>(x), uy - static_cast<float>(y), uz - static_cast<float>(z)};
       const float* low = field + (x + std::ptrdiff_t{y} * view_.row + std::ptrdiff_t{z} * view_.slab);
       const float* high = low + view_.slab;
       const std::int32_t row = view_.row;
-      const float dx00 = low[1] - low[0], dx10 = low[row + 1] - low[row], dx01 = high[1] - high[0],
-                  dx11 = high[row + 1] - high[row];
-      const float c00 = low[0] + fx * dx00, c10 = low[row] + fx * dx10, c01 = high[0] + fx * dx01,
-                  c11 = high[row] + fx * dx11;
-      const float c0 = c00 + fy * (c10 - c00), c1 = c01 + fy * (c11 - c01);
-      const float distance_m = c0 + fz * (c1 - c0);
-      if (!(distance_m <= view_.band_m)) continue;
-      const float gx0 = dx00 + fy * (dx10 - dx00), gx1 = dx01 + fy * (dx11 - dx01);
-      const float gy0 = c10 - c00, gy1 = c11 - c01;
-      hits.add(i, distance_m, normalized(Vec3f{gx0 + fz * (gx1 - gx0), gy0 + fz * (gy1 - gy0), c1 - c0}));
+      const Trilinear sample =
+          trilinear({low[0], low[1], low[row], low[row + 1], high[0], high[1], high[row], high[row + 1]}, at);
+      if (sample.value <= view_.band_m) hits.add(i, sample.value, normalized(sample.gradient));
     }
   }
 

@@ -118,15 +118,13 @@ class HullsPeer : public Peer {
 
   void answer(const Cloud& cloud, const Placement& placement, Hits& hits) const override {
     hits.count = 0;
-    for (std::size_t i = 0; i < cloud.count; ++i) {
-      const Vec3f p_m = placement.apply(cloud.points_m[i]);
-      if (!near_.holds(p_m)) continue;
+    near_.for_each(cloud, placement, [&](std::size_t i, const Vec3f& p_m) {
       float deepest_m = band_m_;
       btVector3 normal(0, 0, 0);
       for (const Hull& hull : hulls_)
         if (hull.may_hold(p_m)) ask(*hull.shape, bullet(p_m), deepest_m, normal);
       if (deepest_m < band_m_) hits.add(i, deepest_m, {normal.x(), normal.y(), normal.z()});
-    }
+    });
   }
   std::size_t bytes() const override {
     std::size_t sum = sizeof(*this);

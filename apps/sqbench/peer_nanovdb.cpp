@@ -1,18 +1,22 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
 // NanoVDB: OpenVDB's tree of 8^3 leaves in one block of memory, sampled by its own trilinear sampler, which
-// keeps the corners of the cell for the gradient.
+// keeps the corners of the cell for the gradient. Blocks of points that reach no brick with a value within
+// the band are left out first.
 #include "peer_nanovdb.hpp"
 
+#include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <type_traits>
+#include <vector>
 
 #include <nanovdb/NanoVDB.h>
 #include <nanovdb/util/GridBuilder.h>
 #include <nanovdb/util/SampleFromVoxels.h>
 
-#include "exact_answer.hpp"
 #include "field.hpp"
+#include "near_bricks.hpp"
 
 namespace sqmap::bench {
 namespace {
@@ -22,7 +26,7 @@ constexpr double kHalfDiagonal = 0.8660254037844387;  // as for dense grids
 template <class Code>
 class NanovdbPeer : public Peer {
  public:
-  NanovdbPeer(const Model& model, unsigned resolution) : near_(model) {
+  NanovdbPeer(const Model& model, unsigned resolution) {
     const Field& field = model.field(resolution);
     field_s_ = field.seconds;
     origin_m_ = cast<float>(field.origin_m);
@@ -40,8 +44,10 @@ class NanovdbPeer : public Peer {
     builder.sdfToLevelSet();
     handle_ = builder.getHandle(field.spacing_m);
     grid_ = handle_.template grid<Code>();
+    near_ = NearBricks(field, kBrickCells, bricks_within(field, kBrickCells, band_m_));
     // Codes divide what a leaf holds, at most from -width to width.
-    const double step_m = std::is_same_v<Code, float> ? 0 : 2 * width_m / 255;
+    const double codes = std::is_same_v<Code, nanovdb::Fp8> ? 255 : 65535;
+    const double step_m = std::is_same_v<Code, float> ? 0 : 2 * width_m / codes;
     stated_percent_ = 100 * (kHalfDiagonal * field.spacing_m + 0.5 * step_m) / model.r_max_m() + 1e-4;
   }
 
@@ -49,34 +55,38 @@ class NanovdbPeer : public Peer {
     hits.count = 0;
     const auto voxels = grid_->tree().getAccessor();
     const auto sampler = nanovdb::createSampler<1>(voxels);
-    for (std::size_t i = 0; i < cloud.count; ++i) {
-      const Vec3f p_m = placement.apply(cloud.points_m[i]);
-      if (!near_.holds(p_m)) continue;
-      const Vec3f u = per_m_ * (p_m - origin_m_);
-      const nanovdb::Vec3f at(u.x, u.y, u.z);
-      const float distance_m = sampler(at);
-      if (!(distance_m <= band_m_)) continue;
-      const nanovdb::Vec3f gradient = sampler.gradient(at);
-      hits.add(i, distance_m, normalized(Vec3f{gradient[0], gradient[1], gradient[2]}));
+    const std::size_t blocks = find_near_blocks(near_.view(), cloud, placement, blocks_);
+    for (std::size_t k = 0; k < blocks; ++k) {
+      const std::size_t begin = blocks_[k] * kBlock, end = std::min(begin + kBlock, cloud.count);
+      for (std::size_t i = begin; i < end; ++i) {
+        const Vec3f u = per_m_ * (placement.apply(cloud.points_m[i]) - origin_m_);
+        const nanovdb::Vec3f at(u.x, u.y, u.z);
+        const float distance_m = sampler(at);
+        if (!(distance_m <= band_m_)) continue;
+        const nanovdb::Vec3f gradient = sampler.gradient(at);
+        hits.add(i, distance_m, normalized(Vec3f{gradient[0], gradient[1], gradient[2]}));
+      }
     }
   }
-  std::size_t bytes() const override { return sizeof(*this) + handle_.size(); }
+  std::size_t bytes() const override { return sizeof(*this) + handle_.size() + near_.bytes(); }
   StatedError stated_error() const override { return {stated_percent_, false}; }
   double field_s() const override { return field_s_; }
 
  private:
   nanovdb::GridHandle<nanovdb::HostBuffer> handle_;
   const nanovdb::NanoGrid<Code>* grid_{};
-  NearBox near_;
+  NearBricks near_;
   Vec3f origin_m_;
   float per_m_{}, band_m_{};
   double stated_percent_{}, field_s_{};
+  mutable std::vector<std::uint32_t> blocks_;  // of the last frame, kept to spare the allocation
 };
 
 }  // namespace
 
 std::unique_ptr<Peer> make_nanovdb(const Model& model, NanovdbCode code, unsigned resolution) {
   if (code == NanovdbCode::kFloat) return std::make_unique<NanovdbPeer<float>>(model, resolution);
+  if (code == NanovdbCode::k16Bit) return std::make_unique<NanovdbPeer<nanovdb::Fp16>>(model, resolution);
   return std::make_unique<NanovdbPeer<nanovdb::Fp8>>(model, resolution);
 }
 

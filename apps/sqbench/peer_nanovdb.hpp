@@ -7,7 +7,7 @@
 
 namespace sqmap::bench {
 
-enum class NanovdbCode { kFloat, k8Bit };
+enum class NanovdbCode { kFloat, k16Bit, k8Bit };
 /// A NanoVDB level set over the lattice of the field at `resolution`, as wide as the band.
 std::unique_ptr<Peer> make_nanovdb(const Model& model, NanovdbCode code, unsigned resolution);
 

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "closest.hpp"
+#include "exact_answer.hpp"
 #include "field.hpp"
 
 namespace sqmap::bench {
@@ -29,7 +30,8 @@ struct Point {
 
 class VoxmapPeer : public ContactPeer {
  public:
-  VoxmapPeer(const Model& model, const bake::Mesh& probe, unsigned resolution) {
+  VoxmapPeer(const Model& model, const bake::Mesh& probe, unsigned resolution)
+      : order_(probe.vertices_m), near_(model) {
     const Field& field = model.field(resolution);
     per_m_ = static_cast<float>(1 / field.spacing_m);
     spacing_m_ = static_cast<float>(field.spacing_m);
@@ -50,8 +52,7 @@ class VoxmapPeer : public ContactPeer {
       for (std::size_t k = 0; k < 3; ++k)
         outward[probe.faces[f][k]] =
             normalized(normals.at(static_cast<std::uint32_t>(f), static_cast<int>(k)));
-    const Cloud order(probe.vertices_m);  // neighbours together, as all methods have them
-    for (const std::uint32_t i : order.source)
+    for (const std::uint32_t i : order_.source)
       shell_.push_back({cast<float>(probe.vertices_m[i]), cast<float>(outward[i])});
   }
 
@@ -59,23 +60,24 @@ class VoxmapPeer : public ContactPeer {
   std::size_t contacts(const Placement& placement) const override {
     std::size_t count = 0;
     Vec3f force_n;
-    for (const Point& point : shell_) {
-      const Vec3f p_m = placement.apply(point.place_m), u = per_m_ * (p_m - origin_m_);
+    near_.for_each(order_, placement, [&](std::size_t index, const Vec3f& p_m) {
+      const Point& point = shell_[index];
+      const Vec3f u = per_m_ * (p_m - origin_m_);
       if (!(u.x >= 0 && u.x < voxels_[0] && u.y >= 0 && u.y < voxels_[1] && u.z >= 0 && u.z < voxels_[2]))
-        continue;
+        return;
       const auto x = static_cast<std::uint32_t>(u.x), y = static_cast<std::uint32_t>(u.y),
                  z = static_cast<std::uint32_t>(u.z);
       const std::uint32_t voxel = at(x, y, z);
-      if (voxel == kFree) continue;
+      if (voxel == kFree) return;
       ++count;
-      if (voxel == kInterior) continue;
+      if (voxel == kInterior) return;
       const Vec3f centre_m =
           origin_m_ + spacing_m_ * Vec3f{static_cast<float>(x) + 0.5F, static_cast<float>(y) + 0.5F,
                                          static_cast<float>(z) + 0.5F};
       const Vec3f inward = -placement.rotation.apply(point.outward);
       const float depth_m = dot(centre_m - p_m, inward);
       if (depth_m > 0) force_n = force_n + (kStiffness_n_per_m * depth_m) * inward;
-    }
+    });
     force_n_ = force_n;
     return count;
   }
@@ -137,7 +139,9 @@ class VoxmapPeer : public ContactPeer {
     return static_cast<std::int32_t>(leaves_.size() - 1);
   }
 
-  float per_m_, spacing_m_;
+  Cloud order_;  // of the probe: neighbours together, as all methods have them
+  NearBox near_;
+  float per_m_{}, spacing_m_{};
   Vec3f origin_m_;
   std::array<float, 3> voxels_{};
   std::array<std::uint32_t, 3> roots_{};

@@ -17,7 +17,7 @@ struct Contestant {
 };
 
 struct Timing {
-  std::vector<double> seconds;  ///< an item, by repetition
+  std::vector<double> seconds;  ///< of processor time, an item, by repetition
   double answers_mean{};
   Spread spread(double units_per_second) const;
   /// This over that, repetition by repetition.

@@ -198,6 +198,24 @@ class Smoke(SmokeRun):
                 self.assertAlmostEqual(twin["answers_mean"], row["answers_mean"],
                                        delta=0 if "culled" in other else 1 + 0.01 * row["answers_mean"])
 
+    def test_leaving_out_blocks_of_points_leaves_out_no_answer(self):
+        for row in self.rows("frames", peer="grid-float-128-simd"):
+            if row["work"] == "grasp":
+                self.assertGreater(row["answers_mean"], 10)
+            for other, share in (("nanovdb-float-128", 0), ("openvdb-float-128", 0), ("nanovdb-8bit-128", 0.01),
+                                 ("bricks-8bit-128-simd", 0.01)):  # codes of 8 bits round at the rim of the band
+                twin = self.rows("frames", peer=other, model=row["model"], work=row["work"])[0]
+                self.assertAlmostEqual(twin["answers_mean"], row["answers_mean"],
+                                       delta=share * row["answers_mean"] + 0.5 * (share > 0), msg=other)
+        for exact in ("embree-closest", "cgal-closest"):
+            for row in self.rows("frames", peer=exact, work="touching"):
+                work = self.rows("works", model=row["model"], work="touching")[0]
+                self.assertAlmostEqual(row["answers_mean"], work["near_mean"], delta=0.5, msg=exact)
+
+    def test_versions_of_the_rivals_are_told(self):
+        for library in ("Bullet", "CGAL", "Embree", "FCL", "Highway", "NanoVDB", "OpenVDB"):
+            self.assertRegex(self.results["machine"]["libraries"], library + r" \d+\.\d+")
+
     def test_poses_do_what_their_names_say(self):
         for row in self.results["works"]:
             with self.subTest(model=row["model"], work=row["work"]):
