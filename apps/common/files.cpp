@@ -6,16 +6,22 @@
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
+#include <set>
+#include <string_view>
 #include <system_error>
+#include <tuple>
 #include <utility>
 
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <sys/file.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
 namespace sqmap::apps {
 namespace {
+
+constexpr int kAttempts = 10;
 
 /// A file descriptor that closes itself.
 class Descriptor {
@@ -53,6 +59,34 @@ Result<std::vector<std::uint8_t>> read_all(int fd, const std::string& name, std:
   }
   bytes.resize(used);
   return bytes;
+}
+
+/// Whether it is called as the temporary files of replace() are.
+bool is_temporary(std::string_view name) {
+  const std::string_view start = kTemporaryPrefix, letters = "XXXXXX", end = ".tmp";
+  return name.size() == start.size() + letters.size() + end.size() && name.starts_with(start) &&
+         name.ends_with(end);
+}
+
+/// Writes beside a file, then takes its place. 0 or errno; ENOENT also where the temporary file was removed.
+int replace(const std::filesystem::path& target, std::span<const std::uint8_t> bytes) {
+  std::string temporary = (target.parent_path() / kTemporaryPrefix).string() + "XXXXXX.tmp";
+  Descriptor file(::mkostemps(temporary.data(), 4, O_CLOEXEC));
+  if (file.get() < 0) return errno;
+  // Held until the file is renamed or its process is gone: remove_abandoned() leaves it alone that long.
+  std::ignore = ::flock(file.get(), LOCK_EX);
+  struct stat made {};
+  if (::fstat(file.get(), &made) == 0 && made.st_nlink == 0) return ENOENT;
+  int code = write_all(file.get(), bytes);
+  const mode_t mask = ::umask(0);  // mkostemps makes private files; the result gets what any new file would
+  ::umask(mask);
+  if (code == 0 && ::fchmod(file.get(), 0666 & ~mask) != 0) code = errno;
+  if (code == 0 && ::fsync(file.get()) != 0)
+    code = errno;  // else a power cut may leave the name without the bytes
+  if (code == 0 && std::rename(temporary.c_str(), target.c_str()) != 0) code = errno;
+  if (const int close_code = file.close(); code == 0) code = close_code;
+  if (code != 0) ::unlink(temporary.c_str());
+  return code;
 }
 
 template <class Failed>
@@ -118,24 +152,36 @@ Outcome write_file(const std::filesystem::path& path, std::span<const std::uint8
   }
   // rename() would put a file in the place of a device such as /dev/null.
   if (exists && !S_ISREG(old.st_mode)) return write_through(target, bytes, failed);
-  std::string temporary = target.string() + ".XXXXXX";
-  Descriptor file(::mkstemp(temporary.data()));
-  if (file.get() < 0) return failed(errno);
-  int code = write_all(file.get(), bytes);
-  const mode_t mask = ::umask(0);  // mkstemp makes private files; the result gets what any new file would
-  ::umask(mask);
-  if (code == 0 && ::fchmod(file.get(), 0666 & ~mask) != 0) code = errno;
-  if (code == 0 && ::fsync(file.get()) != 0)
-    code = errno;  // else a power cut may leave the name without the bytes
-  if (const int close_code = file.close(); code == 0) code = close_code;
-  if (code == 0 && std::rename(temporary.c_str(), target.c_str()) != 0) code = errno;
+  // Once more where somebody took the temporary file for abandoned: between its making and its lock, or where
+  // another machine does not see the lock.
+  int code = ENOENT;
+  for (int attempt = 0; attempt < kAttempts && code == ENOENT; ++attempt) code = replace(target, bytes);
   if (code == 0) return Done{};
-  ::unlink(temporary.c_str());
   return failed(code);
 }
 
 Outcome write_file(const std::filesystem::path& path, const std::string& text) {
   return write_file(path, std::span(reinterpret_cast<const std::uint8_t*>(text.data()), text.size()));
+}
+
+void remove_abandoned(std::span<const std::filesystem::path> files) {
+  namespace fs = std::filesystem;
+  std::error_code code;
+  std::set<fs::path> folders;
+  for (const fs::path& file : files) {
+    const fs::path target = fs::is_symlink(file, code) ? fs::weakly_canonical(file, code) : file;
+    folders.insert(target.has_parent_path() ? target.parent_path() : fs::path("."));
+  }
+  for (const fs::path& folder : folders) {
+    std::vector<fs::path> found;
+    fs::directory_iterator entry(folder, code);
+    for (; !code && entry != fs::directory_iterator(); entry.increment(code))
+      if (is_temporary(entry->path().filename().native())) found.push_back(entry->path());
+    for (const fs::path& path : found) {
+      const Descriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK));
+      if (file.get() >= 0 && ::flock(file.get(), LOCK_EX | LOCK_NB) == 0) ::unlink(path.c_str());
+    }
+  }
 }
 
 }  // namespace sqmap::apps

@@ -21,9 +21,17 @@ Result<std::vector<std::uint8_t>> read_stdin(std::uint64_t max_bytes);
 int write_all(int fd, std::span<const std::uint8_t> bytes);
 
 /// Writes a file atomically: a temporary file beside it, synced, renamed when it is complete. Nothing is left
-/// on failure. A file that holds these bytes already is not touched, so its time stays and build systems see
-/// that nothing changed. Links are followed. Errors: kFileUnwritable.
+/// on failure; what a kill leaves, remove_abandoned() removes. A file that holds these bytes already is not
+/// touched, so its time stays and build systems see that nothing changed. Links are followed. Errors:
+/// kFileUnwritable.
 Outcome write_file(const std::filesystem::path& path, std::span<const std::uint8_t> bytes);
 Outcome write_file(const std::filesystem::path& path, const std::string& text);
+
+/// How the temporary files of write_file() begin; a folder's meshes do not begin with a dot.
+inline constexpr const char* kTemporaryPrefix = ".sqmap-";
+
+/// Removes what write_file() left in the folders of these files where its process was killed: temporary files
+/// that no living process holds a lock on. Where the file system knows no locks, they stay.
+void remove_abandoned(std::span<const std::filesystem::path> files);
 
 }  // namespace sqmap::apps

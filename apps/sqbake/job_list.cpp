@@ -15,6 +15,7 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include "../common/files.hpp"
 #include "inputs.hpp"
 
 namespace sqmap::apps {
@@ -219,6 +220,9 @@ Outcome prepare_folders(const JobList& list, const JobRequest& request) {
                    "make the folder, or name another output"};
     if (const Outcome ok = check_folder(folder); !ok) return ok.error();
   }
+  std::vector<fs::path> bundles;
+  for (const Job& job : list.jobs) bundles.push_back(job.output);
+  remove_abandoned(bundles);
   return Done{};
 }
 

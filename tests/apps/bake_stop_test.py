@@ -1,10 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """Ctrl-C, SIGTERM and a closed pipe end a bake with their own exit codes and leave no partial file."""
+import fcntl
+import json
 import signal
 import subprocess
 import unittest
 
-from support import TIMEOUT_S, FolderTest, command, run, sphere, write_off
+from support import ROUGH, TIMEOUT_S, FolderTest, command, run, sphere, write_off
 
 
 class Stop(FolderTest):
@@ -20,9 +22,10 @@ class Stop(FolderTest):
             write_off(self.models / f"{k:02}.off", (vertices, mesh[1]))
         self.out = self.folder / "out"
 
-    def start(self):
+    def start(self, *options):
         return subprocess.Popen(
-            command("sqbake", "bake", self.models, "--out-dir", self.out, "--progress", "always", "--format", "ndjson"),
+            command("sqbake", "bake", self.models, "--out-dir", self.out, "--progress", "always", "--format", "ndjson",
+                    *options),
             stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
 
     def check_leftovers(self):
@@ -44,6 +47,42 @@ class Stop(FolderTest):
                 _, stderr = process.communicate(timeout=TIMEOUT_S)
                 self.assertEqual(process.returncode, code, stderr)
                 self.check_leftovers()
+
+    def records(self, text):
+        """Outcomes, checked to be whole: one a mesh, and a summary that counts them."""
+        *assets, summary = map(json.loads, text.splitlines())
+        outcomes = [record["outcome"] for record in assets]
+        self.assertEqual(len(outcomes), self.COUNT)
+        self.assertEqual({name: outcomes.count(name) for name in set(outcomes)},
+                         {name: summary[name] for name in set(outcomes)})
+        return outcomes
+
+    def test_the_records_of_a_run_that_is_stopped_or_fails_are_whole(self):
+        process = self.start("-j2")
+        for line in process.stderr:
+            if "01.off" in line and "read" not in line:
+                break
+        process.send_signal(signal.SIGTERM)
+        stdout, _ = process.communicate(timeout=TIMEOUT_S)
+        self.assertEqual(process.returncode, 143)
+        outcomes = self.records(stdout)
+        self.assertEqual(outcomes.count("ok"), len(list(self.out.iterdir())))
+        self.assertGreater(outcomes.count("cancelled"), 0)
+        self.out.rename(self.folder / "earlier")
+        (self.models / "00.off").write_text("OFF\n", encoding="ascii")
+        process = self.start("--fail-fast", "-j1")
+        stdout, _ = process.communicate(timeout=TIMEOUT_S)
+        self.assertEqual((process.returncode, self.records(stdout)), (1, ["failed"] + (self.COUNT - 1) * ["cancelled"]))
+
+    def test_what_a_killed_run_left_is_gone_after_the_next(self):
+        self.out.mkdir()
+        for name in (".sqmap-abc123.tmp", ".sqmap-def456.tmp"):
+            (self.out / name).write_bytes(b"half a bundle")
+        with open(self.out / ".sqmap-def456.tmp", "rb") as held:
+            fcntl.flock(held, fcntl.LOCK_EX)  # as a run does that still writes
+            result = run("sqbake", "bake", self.models / "00.off", *ROUGH, "-o", self.out / "00.h5")
+        self.assert_exit(result, 0)
+        self.assertEqual(sorted(path.name for path in self.out.iterdir()), [".sqmap-def456.tmp", "00.h5"])
 
     def test_a_reader_that_goes_away_stops_the_run(self):
         process = self.start()

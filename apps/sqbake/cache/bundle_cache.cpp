@@ -157,13 +157,14 @@ CacheAnswer BundleCache::lookup(const CacheRequest& request) const {
   if (now.object.empty()) return answer;
   if (!is_current(request.output, last, now)) {
     const std::optional<std::vector<std::uint8_t>> bytes = store_.object(now.object);
-    if (!bytes || !replace_file(request.output, *bytes, true)) {
+    if (!bytes || !write_file(request.output, *bytes)) {
       answer.reasons = {kUnusable};
       return answer;
     }
     answer.output_written = true;
   }
   answer.is_hit = true;
+  answer.object = now.object;
   answer.reasons.emplace_back(answer.output_written ? "copied from the cache" : kUpToDate);
   store_.mark_used(key);
   if (last != now) std::ignore = store_.put_output_record(request.output, now);  // costs time, not truth

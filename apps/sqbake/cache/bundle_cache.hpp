@@ -40,6 +40,7 @@ struct CacheAnswer {
   bool output_written =
       false;                ///< a hit that had to write the output: it was missing or other than it must be
   std::string record_json;  ///< of a hit: what publish() was given
+  std::string object;       ///< of a hit: content hash of the bundle
   /// Why the asset must be baked, or what the hit found; one line each, for --explain. Never empty.
   std::vector<std::string> reasons;
   CacheTicket ticket;

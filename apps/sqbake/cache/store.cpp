@@ -104,30 +104,25 @@ std::string temporary_name() {
   return fmt::format("{}{}-{}-{}.tmp", kTemporaryPrefix, host.data(), ::getpid(), counter++);
 }
 
-}  // namespace
-
-Outcome replace_file(const fs::path& path, std::span<const std::uint8_t> bytes, bool sync) {
+/// Replaces a file of the cache: written beside it, then renamed. Other machines may do the same; gc removes
+/// by its age what a killed one leaves. Not synced: what a crash tears, its hash or schema shows.
+Outcome replace_file(const fs::path& path, std::span<const std::uint8_t> bytes) {
   const auto failed = [&](int code) {
     return Error{Status::kFileUnwritable, fmt::format("{}: {}", path.string(), std::strerror(code)),
                  "check the folder, its permissions and the free space"};
   };
-  struct stat old {};
-  const bool exists = ::stat(path.c_str(), &old) == 0;
-  if (exists && !S_ISREG(old.st_mode)) return failed(S_ISDIR(old.st_mode) ? EISDIR : EEXIST);
-  std::error_code code;
-  const fs::path target = fs::is_symlink(path, code) ? fs::weakly_canonical(path, code) : path;
-  const fs::path temporary = target.parent_path() / temporary_name();
+  const fs::path temporary = path.parent_path() / temporary_name();
   const int fd = ::open(temporary.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
   if (fd < 0) return failed(errno);
-  if (exists) std::ignore = ::fchmod(fd, old.st_mode & 07777);  // the content matters more than the mode
   int problem = write_all(fd, bytes);
-  if (problem == 0 && sync && ::fsync(fd) != 0) problem = errno;
   if (::close(fd) != 0 && problem == 0) problem = errno;  // some file systems report a failed write only here
-  if (problem == 0 && ::rename(temporary.c_str(), target.c_str()) != 0) problem = errno;
+  if (problem == 0 && ::rename(temporary.c_str(), path.c_str()) != 0) problem = errno;
   if (problem == 0) return Done{};
   ::unlink(temporary.c_str());
   return failed(problem);
 }
+
+}  // namespace
 
 std::optional<CacheResult> parse_result(std::span<const std::uint8_t> bytes) {
   const std::optional<Json> json = parsed(bytes, kResultSchema);
@@ -175,9 +170,8 @@ Outcome CacheStore::put(const fs::path& path, std::span<const std::uint8_t> byte
     return Error{Status::kFileUnwritable, fmt::format("{}: {}", path.parent_path().string(), code.message()),
                  "name a cache folder that can be written, or bake without (--no-cache)"};
   if (is_new)
-    if (Outcome tagged = replace_file(folder_ / "CACHEDIR.TAG", bytes_of(kTag), false); !tagged)
-      return tagged;
-  return replace_file(path, bytes, false);  // not synced: what a crash tears, its hash or schema shows
+    if (Outcome tagged = replace_file(folder_ / "CACHEDIR.TAG", bytes_of(kTag)); !tagged) return tagged;
+  return replace_file(path, bytes);
 }
 
 Outcome CacheStore::put_result(const std::string& key, const CacheResult& result) const {

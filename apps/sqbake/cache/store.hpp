@@ -78,11 +78,6 @@ class CacheStore {
   std::filesystem::path folder_;
 };
 
-/// Replaces a file: written beside it under a name that starts with kTemporaryPrefix, then renamed. Its mode
-/// is that of the file it replaces, else that of any new file. Errors: kFileUnwritable.
-Outcome replace_file(const std::filesystem::path& path, std::span<const std::uint8_t> bytes, bool sync);
-inline constexpr const char* kTemporaryPrefix = ".sqmap-";
-
 /// The text of a result file, decoded; empty when it is damaged.
 std::optional<CacheResult> parse_result(std::span<const std::uint8_t> bytes);
 
