@@ -36,7 +36,8 @@ Outcome check_side_outputs(const BakeArguments& arguments, const JobList& list) 
     bundles.push_back(job.output);
   }
   if (!report.empty()) {
-    if (const Outcome ok = check_page("--report", report, bundles); !ok) return ok.error();
+    if (const Outcome ok = check_page("--report", report, arguments.request.force, bundles); !ok)
+      return ok.error();
     if (const Outcome ok = check_apart("--report", report, "an input", read); !ok) return ok.error();
   }
   if (depfile.empty()) return Done{};
@@ -145,7 +146,7 @@ void add_input_options(CLI::App& app, JobRequest& request) {
   app.add_flag("--recursive", request.recursive, "Look below the folders named, too");
   app.add_flag("--keep-extension", request.keep_extension, "Call the bundles NAME.off.h5, not NAME.h5");
   app.add_flag("--force", request.force,
-               "Overwrite files that are not sqmap bundles, and a --depfile that is none");
+               "Overwrite files that are not sqmap bundles, a --depfile and a --report that is none");
 }
 
 void add_run_options(CLI::App& app, BakeArguments& arguments) {

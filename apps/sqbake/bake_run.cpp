@@ -14,6 +14,7 @@
 
 #include "../common/confinement.hpp"
 #include "../common/files.hpp"
+#include "cache/content_hash.hpp"
 #include "depfile.hpp"
 #include "job_cache.hpp"
 #include "record_json.hpp"
@@ -116,6 +117,7 @@ void BakeRun::take_from_cache() {
       continue;
     }
     record.value().is_cached = true;
+    record.value().hash = answer.object;
     record.value().seconds = seconds_since(start);
     record.value().times.clear();
     ++cached_;
@@ -242,6 +244,7 @@ void BakeRun::publish(std::size_t index, BakeProduct product) {
       record.verdict = Verdict::kFailed;
       record.error = written.error();
     }
+    if (record.has_bundle()) record.hash = content_hash(product.bundle);
     record.times.push_back({"write", seconds_since(start)});
     record.seconds += seconds_since(start);
     if (record.has_bundle()) add_to_cache(index, record);

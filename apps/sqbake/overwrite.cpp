@@ -8,6 +8,8 @@
 
 #include <fmt/format.h>
 
+#include "report/report_page.hpp"
+
 namespace sqmap::apps {
 namespace {
 
@@ -31,14 +33,43 @@ Outcome check_folder(std::string_view option, const fs::path& file, std::span<co
   return Done{};
 }
 
-/// A rule of make whose list of dependencies goes on in the next line, as each that write_depfile() makes.
-bool begins_like_depfile(const fs::path& path) {
-  constexpr std::size_t kLongestRule_bytes = 8192;  // twice the longest path, for its escapes
-  std::string start(kLongestRule_bytes, '\0');
+std::string start_of(const fs::path& path, std::size_t size) {
+  std::string start(size, '\0');
   std::ifstream file(path, std::ios::binary);
   file.read(start.data(), static_cast<std::streamsize>(start.size()));
   start.resize(static_cast<std::size_t>(file.gcount()));
+  return start;
+}
+
+/// A rule of make whose list of dependencies goes on in the next line, as each that write_depfile() makes.
+bool begins_like_depfile(const fs::path& path) {
+  constexpr std::size_t kLongestRule_bytes = 8192;  // twice the longest path, for its escapes
+  const std::string start = start_of(path, kLongestRule_bytes);
   return start.substr(0, start.find('\n')).ends_with(": \\");
+}
+
+bool begins_like_page(const fs::path& path) {
+  return start_of(path, 1024).find(kPageMark) != std::string::npos;
+}
+
+/// A run's records end with a summary, too, but of another kind.
+bool ends_like_merged(const fs::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  std::string line, last;
+  while (std::getline(file, line)) last.swap(line);
+  return last.starts_with(R"({"schema":"sqmap.merge/)");
+}
+
+/// `is_ours` is asked of a regular file that holds something.
+Outcome check_replaced(std::string_view option, const fs::path& file, bool force, const char* what,
+                       bool (*is_ours)(const fs::path&)) {
+  std::error_code code;
+  // Devices and pipes have nothing to lose.
+  if (force || !fs::is_regular_file(file, code) || fs::file_size(file, code) == 0 || is_ours(file))
+    return Done{};
+  return Error{Status::kFileUnwritable,
+               fmt::format("{} {}: exists and is not {}", option, file.string(), what),
+               "name another file, or overwrite it with --force"};
 }
 
 }  // namespace
@@ -63,24 +94,24 @@ Outcome check_apart(std::string_view option, const fs::path& file, std::string_v
   return Done{};
 }
 
-Outcome check_page(std::string_view option, const fs::path& file, std::span<const fs::path> bundles) {
+Outcome check_page(std::string_view option, const fs::path& file, bool force,
+                   std::span<const fs::path> bundles) {
   if (file.extension() != ".html")
     return Error{Status::kBadOption,
                  fmt::format("{} {}: a report's name ends in .html", option, file.string()),
                  "choose a name that ends in .html"};
-  return check_folder(option, file, bundles);
+  if (const Outcome ok = check_folder(option, file, bundles); !ok) return ok.error();
+  return check_replaced(option, file, force, "a page of sqbake", begins_like_page);
+}
+
+Outcome check_merged(std::string_view option, const fs::path& file, bool force) {
+  if (const Outcome ok = check_folder(option, file, {}); !ok) return ok.error();
+  return check_replaced(option, file, force, "what a merge wrote", ends_like_merged);
 }
 
 Outcome check_depfile(const fs::path& file, bool force, std::span<const fs::path> bundles) {
   if (const Outcome ok = check_folder("--depfile", file, bundles); !ok) return ok.error();
-  std::error_code code;
-  // Devices and pipes have nothing to lose.
-  if (force || !fs::is_regular_file(file, code) || fs::file_size(file, code) == 0 ||
-      begins_like_depfile(file))
-    return Done{};
-  return Error{Status::kFileUnwritable,
-               fmt::format("--depfile {}: exists and is not a depfile", file.string()),
-               "name another file, or overwrite it with --force"};
+  return check_replaced("--depfile", file, force, "a depfile", begins_like_depfile);
 }
 
 }  // namespace sqmap::apps

@@ -18,10 +18,15 @@ bool is_same_file(const std::filesystem::path& a, const std::filesystem::path& b
 Outcome check_apart(std::string_view option, const std::filesystem::path& file, std::string_view role,
                     std::span<const std::filesystem::path> others);
 
-/// A page takes the place of whatever file has its name, so it must look like one. Errors: kBadOption,
-/// kFileUnwritable (no folder to write it to; those of `bundles` will be there).
-Outcome check_page(std::string_view option, const std::filesystem::path& file,
+/// A page's name ends in .html. It takes the place of another page of sqbake or of an empty file only; with
+/// `force` of any file. Errors: kBadOption, kFileUnwritable (also: no folder to write it to; those of
+/// `bundles` will be there).
+Outcome check_page(std::string_view option, const std::filesystem::path& file, bool force,
                    std::span<const std::filesystem::path> bundles = {});
+
+/// Joined records take the place of joined records or of an empty file only; with `force` of any file.
+/// Errors: kFileUnwritable.
+Outcome check_merged(std::string_view option, const std::filesystem::path& file, bool force);
 
 /// A depfile takes the place of a depfile or of an empty file only; with `force` of any file. Errors:
 /// kFileUnwritable, as of check_page().

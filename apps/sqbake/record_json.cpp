@@ -14,11 +14,8 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 Json body_of(const BakeRecord& record) {
-  Json json{{"parts", record.parts},
-            {"segments", record.segments},
-            {"bytes", record.bytes},
-            {"r_max_m", record.r_max_m},
-            {"stopped_by", record.stopped_by}};
+  Json json{{"parts", record.parts}, {"segments", record.segments}, {"bytes", record.bytes},
+            {"hash", record.hash},   {"r_max_m", record.r_max_m},   {"stopped_by", record.stopped_by}};
   if (const ErrorRow* row = record.finest()) {
     json["eq35_percent"] = row->eq35_percent;
     json["depth_mean_percent"] = row->depth_mean_percent;
@@ -87,6 +84,7 @@ void take_body(const Json& json, BakeRecord& record) {
   record.parts = json.at("parts").get<std::uint32_t>();
   record.segments = json.at("segments").get<std::uint32_t>();
   record.bytes = json.at("bytes").get<std::uint64_t>();
+  record.hash = json.value("hash", "");
   record.r_max_m = json.at("r_max_m").get<double>();
   record.stopped_by = json.at("stopped_by").get<std::string>();
   record.mesh = mesh_from(json.at("mesh"));

@@ -45,6 +45,7 @@ struct BakeRecord {
   bool is_cached = false;  ///< taken from the cache, not baked
 
   std::uint64_t bytes{};  ///< of the bundle
+  std::string hash;       ///< content_hash() of the bundle, once it is written
   std::uint32_t parts{}, segments{};
   double r_max_m{};
   std::string stopped_by;

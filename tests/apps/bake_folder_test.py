@@ -43,9 +43,13 @@ class Folder(FolderTest):
         records = [json.loads(line) for line in result.stdout.splitlines()]
         self.assertEqual([(r["type"], r.get("outcome")) for r in records],
                          [("asset", "ok"), ("asset", "ok"), ("asset", "failed"), ("summary", None)])
-        ball, _, broken, summary = records
+        ball, box_record, broken, summary = records
         self.assertEqual(ball["input"], str(self.models / "ball.off"))
         self.assertEqual(ball["bytes"], (self.out / "ball.h5").stat().st_size)
+        self.assertRegex(ball["hash"], "^[0-9a-f]{32}$")
+        self.assertNotEqual(ball["hash"], box_record["hash"])
+        again = run("sqbake", "bake", self.models / "ball.off", *ROUGH, "-o", self.folder / "other.h5", "--format", "ndjson")
+        self.assertEqual(json.loads(again.stdout.splitlines()[0])["hash"], ball["hash"], "equal bytes, equal hash")
         self.assertIn(ball["stopped_by"], ("target", "parts", "bytes", "gain"))
         self.assertAlmostEqual(ball["r_max_m"], 2, places=5)
         self.assertGreater(len(ball["stages"]), 2)

@@ -71,8 +71,8 @@ class Records(FolderTest):
     def test_the_schema_refuses_what_is_no_record(self):
         good = self.valid(run("sqbake", "bake", self.models / "ball.off", *ROUGH, "-o", self.folder / "a.h5", "--format",
                               "ndjson").stdout.splitlines()[0])
-        for change in ({"outcome": "fine"}, {"outcome": "failed"}, {"parts": 0}, {"unknown": 1}, {"schema": "x"},
-                       {"mesh": {}}, {"fits": []}, {"fits": [{"iterations": 1, "stop": "fine"}]}):
+        for change in ({"outcome": "fine"}, {"outcome": "failed"}, {"parts": 0}, {"hash": "x"}, {"unknown": 1},
+                       {"schema": "x"}, {"mesh": {}}, {"fits": []}, {"fits": [{"iterations": 1, "stop": "fine"}]}):
             with self.subTest(change=change), self.assertRaises(jsonschema.ValidationError):
                 self.validator.validate({**good, **change})
 
@@ -86,6 +86,7 @@ class Records(FolderTest):
         cold, again, other = ([self.valid(line) for line in r.stdout.splitlines()] for r in (cold, again, other))
         self.assertEqual([r["cached"] for r in again], [True, False, True, True, 3])
         drop = ("cached", "seconds", "stages", "output", "error")
+        self.assertEqual([("hash" in r) for r in cold[:4]], [True, False, True, True])
         for first, second, third in zip(cold[:4], again, other):
             bare = [{k: v for k, v in r.items() if k not in drop} for r in (first, second, third)]
             self.assertEqual(bare[0], bare[1])

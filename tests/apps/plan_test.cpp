@@ -155,6 +155,20 @@ TEST(Merge, TimesAndTheCacheAreNoConflictButOtherBundlesAre) {
   EXPECT_FALSE(merged.is_complete());
 }
 
+TEST(Merge, TheHashesOfTheBundlesDecideWhereThereAreTwo) {
+  const std::string one = R"(,"hash":"00000000000000000000000000000001")";
+  const AssetRecord first = record("a", "ok", one + R"(,"parts":3)");
+  const AssetRecord same = record("a", "ok", one + R"(,"parts":3,"warnings":["w"])");
+  const AssetRecord other = record("a", "ok", R"(,"hash":"00000000000000000000000000000002","parts":3)");
+  const AssetRecord old = record("a", "ok", R"(,"parts":3)"), old_other = record("a", "ok", R"(,"parts":4)");
+  EXPECT_TRUE(merge_records({first, same}, nullptr).is_complete());
+  EXPECT_EQ(merge_records({first, other}, nullptr).conflicting, std::vector<std::string>{"a"});
+  EXPECT_TRUE(merge_records({first, old}, nullptr).is_complete()) << "a record of an older version has none";
+  EXPECT_FALSE(merge_records({first, old_other}, nullptr).is_complete());
+}
+
+TEST(Merge, APlanWithoutAssetsIsNone) { EXPECT_FALSE(parse_plan("", "plan")); }
+
 TEST(Merge, FollowsThePlanAndNamesWhatIsMissingOrTooMuch) {
   const Result<std::vector<PlannedAsset>> plan = parse_plan(
       "{\"type\":\"plan\",\"input\":\"1\",\"output\":\"z\"}\n{\"type\":\"plan\",\"output\":\"y\"}\n"

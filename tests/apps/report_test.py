@@ -148,7 +148,12 @@ class Report(FolderTest):
                  (("merge", "x.ndjson", "--plan", "plan.ndjson", "-o", "plan.ndjson"), 2, "an input"),
                  (("merge", "x.ndjson", "--report", "notes.txt"), 2, ".html"),
                  (("merge", "x.html", "--report", "x.html"), 2, "an input"),
-                 (("merge", "x.ndjson", "-o", "new.html", "--report", "new.html"), 2, "the output")]
+                 (("merge", "x.ndjson", "-o", "new.html", "--report", "new.html"), 2, "the output"),
+                 (("report", "x.ndjson", "-o", "x.html"), 3, "is not a page of sqbake"),
+                 (("merge", "x.ndjson", "--report", "x.html"), 3, "is not a page of sqbake"),
+                 (("merge", "x.ndjson", "-o", "plan.ndjson"), 3, "is not what a merge wrote"),
+                 (("merge", "x.ndjson", "-o", "notes.txt"), 3, "is not what a merge wrote"),
+                 (("merge", "x.ndjson", "-o", "none/x.ndjson"), 3, "no folder")]
         for arguments, code, named in cases:
             with self.subTest(arguments=arguments):
                 result = run("sqbake", *arguments, cwd=self.folder)
@@ -156,6 +161,23 @@ class Report(FolderTest):
                 self.assertEqual(result.stdout, "")
                 self.assertIn(named, result.stderr)
                 self.assertEqual({name: (self.folder / name).read_bytes() for name in self.files()}, before)
+
+    def test_a_merge_replaces_what_a_merge_wrote_an_empty_file_and_with_force_any(self):
+        line = json.dumps(self.record("a.off", parts=1)) + "\n"
+        summary = json.dumps({"schema": "sqmap.bake/2", "type": "summary"}) + "\n"
+        (self.folder / "x.ndjson").write_text(line + summary, encoding="ascii")
+        (self.folder / "all.ndjson").touch()
+        merge = ("merge", "x.ndjson", "-o", "all.ndjson", "--report", "page.html")
+        for more in ((), (), ("--force",)):
+            self.assert_exit(run("sqbake", *merge, *more, cwd=self.folder), 0)
+            self.assertIn(line.strip()[1:20], (self.folder / "all.ndjson").read_text(encoding="utf-8"))
+            if more:
+                continue
+            self.assert_exit(run("sqbake", "report", "x.ndjson", "-o", "page.html", cwd=self.folder), 0)
+        for name in ("all.ndjson", "page.html"):
+            (self.folder / name).write_text(line, encoding="ascii")
+            self.assert_exit(run("sqbake", *merge, cwd=self.folder), 3)
+            self.assert_exit(run("sqbake", *merge, "--force", cwd=self.folder), 0)
 
     def test_names_from_strangers_stay_text(self):
         name = "<script>alert(1)</script>\"'&.off"

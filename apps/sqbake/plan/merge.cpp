@@ -13,11 +13,16 @@ namespace {
 
 using Json = nlohmann::json;
 
-/// What two runs must agree on.
+/// What two runs must agree on that tell of no hash.
 Json lasting(const AssetRecord& record) {
   Json json = Json::parse(record.line, nullptr, false);
-  for (const char* name : {"seconds", "cached", "stages", "warnings"}) json.erase(name);
+  for (const char* name : {"seconds", "cached", "stages", "warnings", "hash"}) json.erase(name);
   return json;
+}
+
+bool tell_of_one_bundle(const AssetRecord& a, const AssetRecord& b) {
+  if (!a.hash.empty() && !b.hash.empty()) return a.hash == b.hash;
+  return lasting(a) == lasting(b);
 }
 
 }  // namespace
@@ -37,6 +42,9 @@ Result<std::vector<PlannedAsset>> parse_plan(std::string_view text, std::string_
                    "give what `sqbake plan --format ndjson` wrote"};
     plan.push_back({word("input"), word("output")});
   }
+  if (plan.empty())
+    return Error{Status::kInvalidAsset, fmt::format("{}: names no asset", source),
+                 "give what `sqbake plan --format ndjson` wrote"};
   return plan;
 }
 
@@ -54,7 +62,7 @@ MergedRecords merge_records(std::vector<AssetRecord> records, const std::vector<
     if (is_new) continue;
     ++merged.duplicate_count;
     AssetRecord& held = entry->second;
-    if (held.has_bundle() && record.has_bundle() && lasting(held) != lasting(record))
+    if (held.has_bundle() && record.has_bundle() && !tell_of_one_bundle(held, record))
       conflicting.insert(record.output);
     if (record.has_bundle() || !held.has_bundle()) held = std::move(record);
   }

@@ -18,7 +18,7 @@ struct PlannedAsset {
   std::string input, output;
 };
 /// Records of type "plan", from `sqbake plan` or `sqbake bake -n`. `source` names the text in errors.
-/// Errors: kInvalidAsset with the number of the line.
+/// Errors: kInvalidAsset with the number of the line, or where it names no asset.
 Result<std::vector<PlannedAsset>> parse_plan(std::string_view text, std::string_view source);
 
 struct MergedRecords {
@@ -34,8 +34,9 @@ struct MergedRecords {
 };
 
 /// Joins the records of several runs. Of two for the same output, one with a bundle counts more than one
-/// without, and the later more than the earlier: a run that was repeated replaces the one that failed. Times
-/// and the use of the cache may differ; anything else makes two records with bundles a conflict.
+/// without, and the later more than the earlier: a run that was repeated replaces the one that failed. Two
+/// records with bundles are a conflict where the hashes of these differ; without hashes, where anything does
+/// but times and the use of the cache.
 MergedRecords merge_records(std::vector<AssetRecord> records, const std::vector<PlannedAsset>* plan);
 
 }  // namespace sqmap::apps

@@ -27,15 +27,20 @@ constexpr std::uint64_t kLargestRecords = std::uint64_t{1} << 30;
 struct MergeArguments {
   std::vector<std::filesystem::path> records;
   std::filesystem::path plan, output, report;
+  bool force = false;
+};
+
+struct ReadRecords {
+  std::vector<AssetRecord> records;
+  std::vector<std::string> unfinished;  ///< files whose runs were stopped before they could sum up
 };
 
 std::string_view text_of(const std::vector<std::uint8_t>& bytes) {
   return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
 }
 
-Result<std::vector<AssetRecord>> read_records(Console& console,
-                                              const std::vector<std::filesystem::path>& files) {
-  std::vector<AssetRecord> all;
+Result<ReadRecords> read_records(Console& console, const std::vector<std::filesystem::path>& files) {
+  ReadRecords all;
   for (const std::filesystem::path& file : files) {
     const Result<std::vector<std::uint8_t>> bytes = read_file(file, kLargestRecords);
     if (!bytes) return bytes.error();
@@ -43,12 +48,13 @@ Result<std::vector<AssetRecord>> read_records(Console& console,
     if (!records) return records.error();
     if (records.value().is_cut_off)
       console.warning(fmt::format("{}: the last record is cut off and left out", file.string()));
-    for (AssetRecord& record : records.value().records) all.push_back(std::move(record));
+    if (!records.value().has_summary) all.unfinished.push_back(file.string());
+    for (AssetRecord& record : records.value().records) all.records.push_back(std::move(record));
   }
   return all;
 }
 
-std::string merged_text(const MergedRecords& merged) {
+std::string merged_text(const MergedRecords& merged, const std::vector<std::string>& unfinished) {
   std::string text;
   for (const AssetRecord& record : merged.records) text += record.line + "\n";
   Json summary{{"schema", "sqmap.merge/1"}, {"type", "summary"}};
@@ -56,24 +62,28 @@ std::string merged_text(const MergedRecords& merged) {
   summary["missing"] = merged.missing;
   summary["unplanned"] = merged.unplanned;
   summary["conflicting"] = merged.conflicting;
+  summary["unfinished"] = unfinished;
   summary["duplicates"] = merged.duplicate_count;
   return text + json_line(summary);
 }
 
-/// Whether the files to write may be written: none is an input, and a page looks like one.
+/// Whether the files to write may be written: none is an input, and what they replace a merge has made.
 Outcome check_outputs(const MergeArguments& arguments) {
   const std::filesystem::path &output = arguments.output, &report = arguments.report;
   std::vector<std::filesystem::path> read = arguments.records;
   if (!arguments.plan.empty()) read.push_back(arguments.plan);
   const bool has_file = !output.empty() && output != "-";
-  if (has_file)
-    if (const Outcome ok = check_apart("-o", output, "an input", read); !ok) return ok.error();
+  if (has_file) {
+    Outcome ok = check_apart("-o", output, "an input", read);
+    if (ok) ok = check_merged("-o", output, arguments.force);
+    if (!ok) return ok.error();
+  }
   if (report.empty()) return Done{};
   if (const Outcome ok = check_apart("--report", report, "an input", read); !ok) return ok.error();
   if (has_file)
     if (const Outcome ok = check_apart("--report", report, "the output", {&output, 1}); !ok)
       return ok.error();
-  return check_page("--report", report);
+  return check_page("--report", report, arguments.force);
 }
 
 Exit run_merge(Console& console, const MergeArguments& arguments) {
@@ -90,10 +100,21 @@ Exit run_merge(Console& console, const MergeArguments& arguments) {
     if (!parsed) return refuse(parsed.error());
     plan = std::move(parsed).value();
   }
-  Result<std::vector<AssetRecord>> records = read_records(console, arguments.records);
-  if (!records) return refuse(records.error());
-  const MergedRecords merged = merge_records(std::move(records).value(), plan ? &*plan : nullptr);
+  Result<ReadRecords> read = read_records(console, arguments.records);
+  if (!read) return refuse(read.error());
+  auto& [records, unfinished] = read.value();
+  if (records.empty() && !plan)
+    return refuse({Status::kInvalidAsset,
+                   "no record of an asset in " + arguments.records.front().string() +
+                       (arguments.records.size() > 1 ? " and the other files" : ""),
+                   "give what `sqbake bake --format ndjson` wrote"});
+  const MergedRecords merged = merge_records(std::move(records), plan ? &*plan : nullptr);
+  // A plan tells whether anything is missing; else what these runs had still to do is not known.
+  const bool is_complete = merged.is_complete() && (plan || unfinished.empty());
 
+  if (!is_complete)
+    for (const std::string& file : unfinished)
+      console.warning(file + ": has no summary; its run was stopped, or goes on");
   for (const std::string& output : merged.missing) console.error(output + ": no record; run its shard again");
   for (const std::string& output : merged.conflicting)
     console.error(output + ": two runs made different bundles; bake it again, with one version of sqbake");
@@ -103,7 +124,7 @@ Exit run_merge(Console& console, const MergeArguments& arguments) {
     if (!record.has_bundle())
       console.error(fmt::format("{}: {}: {}", record.input, record.outcome, record.finding));
 
-  const std::string text = merged_text(merged);
+  const std::string text = merged_text(merged, unfinished);
   if (arguments.output.empty() || arguments.output == "-") {
     console.out(text);
   } else if (const Outcome written = write_file(arguments.output, text); !written) {
@@ -112,7 +133,7 @@ Exit run_merge(Console& console, const MergeArguments& arguments) {
   if (!arguments.report.empty())
     if (const Outcome written = write_file(arguments.report, report_page(merged.records, {})); !written)
       return refuse(written.error());
-  return merged.is_complete() ? Exit::kOk : Exit::kSomeFailed;
+  return is_complete ? Exit::kOk : Exit::kSomeFailed;
 }
 
 }  // namespace
@@ -124,7 +145,7 @@ std::function<Exit(Console&)> declare_merge(CLI::App& app) {
       "latest. Says\n"
       "which assets of the plan have none, and for which two runs disagree; then, or where an asset has no "
       "bundle,\n"
-      "it exits with 1.\n"
+      "it exits with 1. Without a plan, it also does where a run has not come to its end.\n"
       "\n"
       "Examples:\n"
       "  sqbake merge shard-*.ndjson -o all.ndjson --plan plan.ndjson --report all.html\n");
@@ -136,6 +157,7 @@ std::function<Exit(Console&)> declare_merge(CLI::App& app) {
       ->type_name("FILE.ndjson");
   app.add_option("--report", args->report, "Also write the page that `sqbake report` makes")
       ->type_name("FILE.html");
+  app.add_flag("--force", args->force, "Overwrite files that no merge has made, too");
   return [args](Console& console) { return run_merge(console, *args); };
 }
 

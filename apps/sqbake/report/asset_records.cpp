@@ -36,6 +36,7 @@ AssetRecord record_of(const Json& json, std::string_view line) {
   record.input = text(json, "input");
   record.output = text(json, "output");
   record.outcome = text(json, "outcome");
+  record.hash = text(json, "hash");
   const Json& cached = member(json, "cached");
   record.is_cached = cached.is_boolean() && cached.get<bool>();
   record.seconds = number(json, "seconds");
@@ -64,6 +65,7 @@ Result<AssetRecords> parse_asset_records(std::string_view all, std::string_view 
     const std::size_t end = all.find('\n', start);
     if (end == std::string_view::npos) {
       result.is_cut_off = true;
+      result.has_summary = false;
       break;
     }
     const std::string_view line = all.substr(start, end - start);
@@ -76,6 +78,7 @@ Result<AssetRecords> parse_asset_records(std::string_view all, std::string_view 
                    fmt::format("{}:{}: no record of sqbake, must be an object with a schema sqmap.*", source,
                                number_of_line),
                    "give what `sqbake bake --format ndjson` wrote"};
+    result.has_summary = text(json, "type") == "summary";
     if (!schema.starts_with("sqmap.bake/") || text(json, "type") != "asset") continue;
     AssetRecord record = record_of(json, line);
     if (record.input.empty() || record.output.empty() || record.outcome.empty())

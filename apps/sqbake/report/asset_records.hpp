@@ -16,6 +16,7 @@ namespace sqmap::apps {
 struct AssetRecord {
   std::string line;  ///< the record itself, without its line feed
   std::string input, output, outcome;
+  std::string hash;  ///< of the bundle; empty in records of older versions
   bool is_cached = false;
   double seconds{};
   std::string finding, remedy;       ///< of a failure
@@ -31,7 +32,8 @@ struct AssetRecord {
 
 struct AssetRecords {
   std::vector<AssetRecord> records;
-  bool is_cut_off = false;  ///< the last line has no end: its writer was killed; it is left out
+  bool is_cut_off = false;   ///< the last line has no end: its writer was killed; it is left out
+  bool has_summary = false;  ///< the last line is a summary: the run came to its end
 };
 
 /// The asset records of an NDJSON text; other records (summaries) are passed over. `source` names it in

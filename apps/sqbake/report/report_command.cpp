@@ -22,6 +22,7 @@ constexpr std::uint64_t kLargestRecords = std::uint64_t{1} << 30;
 struct ReportArguments {
   std::vector<std::filesystem::path> records;
   std::filesystem::path output;
+  bool force = false;
   ReportOptions options{"", ReportOptions{}.picture_count};
 };
 
@@ -32,7 +33,7 @@ Exit run_report(Console& console, const ReportArguments& arguments) {
   };
   if (arguments.output != "-") {
     Outcome ok = check_apart("-o", arguments.output, "an input", arguments.records);
-    if (ok) ok = check_page("-o", arguments.output);
+    if (ok) ok = check_page("-o", arguments.output, arguments.force);
     if (!ok) return refuse("-o " + arguments.output.string(), ok.error());
   }
   std::vector<AssetRecord> all;
@@ -81,6 +82,7 @@ std::function<Exit(Console&)> declare_report(CLI::App& app) {
                  fmt::format("Draw at most so many assets, the worst and slowest first\n(default {})",
                              ReportOptions{}.picture_count))
       ->type_name("COUNT");
+  app.add_flag("--force", args->force, "Overwrite a file that is no page of sqbake, too");
   return [args](Console& console) {
     return run_confined(console, {{.heap_bytes = physical_memory_bytes(), .may_start_threads = true},
                                   args->records.front().string(),

@@ -265,11 +265,12 @@ std::string gallery(std::span<const AssetRecord> records, std::size_t most) {
 
 std::string report_page(std::span<const AssetRecord> records, const ReportOptions& options) {
   return "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\n"
-         "<meta name=\"viewport\" content=\"width=device-width\">\n<title>" +
-         html_text(options.title) + "</title>\n<style>" + kStyle + "</style></head>\n<body>\n<h1>" +
-         html_text(options.title) + "</h1>\n" + summary(records) + failures(records) +
-         largest_errors(records) + slowest(records) + gallery(records, options.picture_count) +
-         all_assets(records) + "<script>" + kScript + "</script>\n</body></html>\n";
+         "<meta name=\"viewport\" content=\"width=device-width\">\n" +
+         std::string(kPageMark) + "\n<title>" + html_text(options.title) + "</title>\n<style>" + kStyle +
+         "</style></head>\n<body>\n<h1>" + html_text(options.title) + "</h1>\n" + summary(records) +
+         failures(records) + largest_errors(records) + slowest(records) +
+         gallery(records, options.picture_count) + all_assets(records) + "<script>" + kScript +
+         "</script>\n</body></html>\n";
 }
 
 }  // namespace sqmap::apps

@@ -15,6 +15,9 @@ struct ReportOptions {
   std::size_t picture_count = 60;
 };
 
+/// In the head of every page: what wrote it.
+inline constexpr const char* kPageMark = "<meta name=\"generator\" content=\"sqbake\">";
+
 /// One HTML page that needs no other file and no network: outcomes, failures with their remedies, the largest
 /// errors, the slowest assets with their stages, all assets, and pictures of the bundles that can still be
 /// read. The same records and bundles give the same page.
