@@ -43,6 +43,24 @@ bool set_holds(std::string_view pattern, char c, std::size_t& length) {
   return holds != is_negated;
 }
 
+/// What is wrong with a name of a pattern, but for `..`.
+std::string name_fault(std::string_view name) {
+  for (std::size_t at = 0; at < name.size(); ++at) {
+    if (name[at] == '*' && at + 1 < name.size() && name[at + 1] == '*' && name.size() > 2)
+      return fmt::format("`**` must be a whole name, not a piece of `{}`", name);
+    if (name[at] != '[') continue;
+    std::size_t length = 0;
+    set_holds(name.substr(at), 'x', length);
+    if (length == 0) return fmt::format("`[` without `]` in `{}`; a bracket itself is `[[]`", name);
+    const std::string_view set = name.substr(at, length);
+    for (std::size_t k = 2; k + 2 < set.size(); ++k)
+      if (set[k] == '-' && set[k - 1] > set[k + 1])
+        return fmt::format("`{}` in `{}` holds nothing: its ends are in the wrong order", set, name);
+    at += length - 1;
+  }
+  return "";
+}
+
 /// Backtracks to the last star only: that is enough for stars within one name, and linear in practice.
 bool name_matches(std::string_view pattern, std::string_view name) {
   std::size_t p = 0, n = 0, star = std::string_view::npos, star_n = 0;
@@ -105,6 +123,16 @@ bool glob_matches(std::string_view pattern, std::string_view path, bool anywhere
   return names_match(names_of(pattern), names);
 }
 
+std::string glob_fault(std::string_view pattern) {
+  if (names_of(pattern).empty()) return "names nothing";
+  if (pattern.ends_with('/')) return "ends in `/`, but matches files; append `**` for all below a folder";
+  for (const std::string_view name : names_of(pattern)) {
+    if (name == "..") return "holds `..`, which no file below its folder has";
+    if (std::string fault = name_fault(name); !fault.empty()) return fault;
+  }
+  return "";
+}
+
 fs::path glob_root(std::string_view pattern) {
   const std::size_t wildcard = std::min(pattern.find_first_of("*?["), pattern.size());
   const std::size_t slash = pattern.substr(0, wildcard).rfind('/');
@@ -141,6 +169,8 @@ Result<std::vector<fs::path>> expand_glob(std::string_view pattern) {
                  "check the path"};
   const std::string_view rest =
       root.empty() ? pattern : pattern.substr(root.native().size() + (root == "/" ? 0 : 1));
+  if (const std::string fault = glob_fault(rest); !fault.empty())
+    return Error{Status::kBadOption, fmt::format("{}: {}", pattern, fault), "check the pattern"};
   const bool is_deep = rest.find('/') != std::string_view::npos || rest == "**";
   Result<std::vector<fs::path>> files = files_below(root.empty() ? fs::path(".") : root, is_deep);
   if (!files) return files;

@@ -18,6 +18,11 @@ bool is_glob(std::string_view text);
 /// matched against the file name alone where `anywhere` is set, as in .gitignore.
 bool glob_matches(std::string_view pattern, std::string_view path, bool anywhere = false);
 
+/// What makes a pattern one that cannot mean what it says, for people; empty for a sound one: a set without
+/// its `]` or with its ends in the wrong order, `**` beside other letters of a name, a folder `..`, an end in
+/// `/`.
+std::string glob_fault(std::string_view pattern);
+
 /// The folder before the first name that holds a wildcard; empty for the working folder.
 std::filesystem::path glob_root(std::string_view pattern);
 
@@ -26,7 +31,8 @@ std::filesystem::path glob_root(std::string_view pattern);
 /// folder that cannot be entered.
 Result<std::vector<std::filesystem::path>> files_below(const std::filesystem::path& folder, bool recursive);
 
-/// The files that match, sorted. Errors: kFileMissing (glob_root is no folder), kFileUnreadable.
+/// The files that match, sorted. Errors: kBadOption (glob_fault), kFileMissing (glob_root is no folder),
+/// kFileUnreadable.
 Result<std::vector<std::filesystem::path>> expand_glob(std::string_view pattern);
 
 }  // namespace sqmap::apps

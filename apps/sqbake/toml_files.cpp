@@ -11,6 +11,7 @@
 
 #include "../common/files.hpp"
 #include "../common/spelling.hpp"
+#include "glob.hpp"
 
 namespace sqmap::apps {
 namespace {
@@ -129,6 +130,8 @@ Result<ProjectFile> read_project_file(const fs::path& path) {
   for (const toml::table* table : tables.value()) {
     Result<std::string> pattern = required_text(*table, "match", path);
     if (!pattern) return pattern.error();
+    if (const std::string fault = glob_fault(pattern.value()); !fault.empty())
+      return wrong(path, *table->get("match"), fmt::format("match `{}`: {}", pattern.value(), fault));
     Result<SettingValues> values = settings_in(*table, path, {"match"});
     if (!values) return values.error();
     for (auto& [name, value] : values.value()) value.source += fmt::format(" (rule `{}`)", pattern.value());

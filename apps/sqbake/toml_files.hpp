@@ -36,7 +36,8 @@ struct Manifest {
 };
 
 /// The three kinds of TOML file. Errors: kFileMissing, kFileUnreadable; kBadOption for what is no TOML, an
-/// unknown key (with the one that was probably meant) or a value that cannot be, each with its line.
+/// unknown key (with the one that was probably meant), a value or a pattern that cannot be, each with its
+/// line.
 Result<ProjectFile> read_project_file(const std::filesystem::path& path);
 Result<Manifest> read_manifest(const std::filesystem::path& path);
 Result<SettingValues> read_sidecar(const std::filesystem::path& path);

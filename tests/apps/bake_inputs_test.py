@@ -49,6 +49,13 @@ class Inputs(FolderTest):
         self.refuse(3, "*.stl", f"{self.models}/**/*.stl")
         self.refuse(3, "nowhere", f"{self.models}/nowhere/*.off")
 
+    def test_a_broken_pattern_is_refused(self):
+        self.refuse(2, "without `]`", f"{self.models}/[ab.off")
+        self.refuse(2, "whole name", f"{self.models}/**.off")
+        write_off(self.models / "[ab.off", box())
+        self.assertEqual(self.pairs(self.models / "[ab.off"), [("[ab.off", "[ab.h5")])
+        self.assertEqual(self.pairs(f"{self.models}/[[]*.off"), [("[ab.off", "[ab.h5")])
+
     def test_a_list_names_one_input_a_line(self):
         (self.folder / "list.txt").write_text("models/deep/b.off\r\n\nmodels/deep/er\nmodels/*.off\n", encoding="ascii")
         expected = [("models/deep/b.off", "models/deep/b.h5"), ("models/deep/er/c.off", "c.h5"),
@@ -198,6 +205,12 @@ class Settings(FolderTest):
                  ("sqbake.toml", '[default]\nquality = "good"\n', [":2", "`good`", "draft, standard, fine"]),
                  ("sqbake.toml", "[default\n", ["sqbake.toml:1"]),
                  ("sqbake.toml", "[[rule]]\nunit = 1\n", [":1", "match"]),
+                 ("sqbake.toml", '[[rule]]\nunit = 1\nmatch = "props/[ab.off"\n', [":3", "`props/[ab.off`", "without `]`"]),
+                 ("sqbake.toml", '[[rule]]\nmatch = "[z-a]*"\n', [":2", "wrong order"]),
+                 ("sqbake.toml", '[[rule]]\nmatch = "props**/*.off"\n', [":2", "whole name"]),
+                 ("sqbake.toml", '[[rule]]\nmatch = "../*.off"\n', [":2", "`..`"]),
+                 ("sqbake.toml", '[[rule]]\nmatch = "props/"\n', [":2", "`**`"]),
+                 ("sqbake.toml", '[[rule]]\nmatch = "./"\n', [":2", "names nothing"]),
                  ("sqbake.toml", "[default]\nmax-parts = 0\n", [":2", "--max-parts = 0"]),
                  ("props/chair.sqbake.toml", "max-err = 1\n", ["chair.sqbake.toml:1", "did you mean `max-error`?"])]
         for name, text, named in cases:
