@@ -36,7 +36,7 @@ void ProgressBoard::at(std::size_t index, std::string_view stage, double fractio
   const bool is_new_stage = !state.is_running || state.stage != stage;
   state = {std::string(stage), std::clamp(fraction, 0.0, 1.0), true};
   if (style_ == Style::kPlain) {
-    if (is_new_stage) console_.note(fmt::format("{}: {}", items_[index].name, stage));
+    if (is_new_stage) console_.note(fmt::format("{}{}: {}", count(), items_[index].name, stage));
     return;
   }
   if (is_new_stage || Clock::now() - last_draw_ >= kRedrawInterval) draw(index);
@@ -55,10 +55,8 @@ void ProgressBoard::finished(std::size_t index) {
 
 void ProgressBoard::draw(std::size_t index) {
   last_draw_ = Clock::now();
-  std::string line;
-  if (items_.size() > 1) line += fmt::format("[{}/{}] ", finished_count_ + skipped_count_, items_.size());
-  line +=
-      fmt::format("{}  {} {:.0f} %", items_[index].name, states_[index].stage, 100 * states_[index].fraction);
+  std::string line = fmt::format("{}{}  {} {:.0f} %", count(), items_[index].name, states_[index].stage,
+                                 100 * states_[index].fraction);
   const auto running = std::ranges::count_if(states_, &State::is_running);
   if (running > 1) line += fmt::format(" and {} more", running - 1);
   console_.status(line + rate_and_time_left());
@@ -68,6 +66,11 @@ void ProgressBoard::skip(std::size_t index) {
   const std::scoped_lock lock(mutex_);
   ++skipped_count_;
   total_weight_ -= items_[index].weight;
+}
+
+std::string ProgressBoard::count() const {
+  if (items_.size() < 2) return "";
+  return fmt::format("[{}/{}] ", finished_count_ + skipped_count_, items_.size());
 }
 
 std::string ProgressBoard::rate_and_time_left() const {

@@ -32,6 +32,8 @@ class ProgressBoard {
   enum class Style { kNone, kLine, kPlain };
 
   void draw(std::size_t index);
+  /// "[done/all] "; nothing for a single item.
+  std::string count() const;
   std::string rate_and_time_left() const;
 
   struct State {

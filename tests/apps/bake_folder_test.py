@@ -121,6 +121,13 @@ class Folder(FolderTest):
         self.assertNotIn("\r", plain.stderr)
         self.assertEqual(run("sqbake", "bake", mesh, *ROUGH, "-o", self.folder / "b.h5").stderr, "")
 
+    def test_progress_of_a_folder_in_a_log_counts(self):
+        (self.models / "broken.off").unlink()
+        log = run("sqbake", "bake", self.models, *ROUGH, "--recursive", "--out-dir", self.out, "--progress", "always",
+                  "-j1").stderr
+        for done, name in enumerate(("ball.off", "box with space.off", "deep/box.off")):
+            self.assertRegex(log, rf"(?m)^sqbake: \[{done}/3\] {name}: read$")
+
     def test_verbose_adds_the_time_of_each_stage(self):
         result = run("sqbake", "bake", self.models / "ball.off", *ROUGH, "-o", self.folder / "a.h5", "-v")
         self.assertRegex(result.stdout, r"(?m)^  read +\d+\.\d+ s$")
