@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -77,6 +78,27 @@ Outcome write_run_report(const BakeArguments& arguments, std::string_view record
   return write_file(arguments.report, page);
 }
 
+/// Leaves the share that was asked for; where none was, and the meshes were searched for, that of the job
+/// array. Who named a mesh in a task of an array has dealt the meshes out already.
+Outcome take_shard(Console& console, const BakeArguments& arguments, JobList& list) {
+  if (!arguments.shard.empty()) {
+    const Result<Shard> shard = parse_shard(arguments.shard);
+    if (!shard) return shard.error();
+    keep_shard(list, shard.value());
+    return Done{};
+  }
+  if (!list.is_searched) return Done{};
+  const Result<std::optional<Shard>> shard = shard_of_job_array();
+  if (!shard) return shard.error();
+  if (!shard.value() || shard.value()->count == 1) return Done{};
+  const std::size_t all = list.jobs.size();
+  keep_shard(list, *shard.value());
+  console.insist(
+      fmt::format("a task of a job array: bakes --shard {}/{}, {} of {} meshes; --shard 1/1 bakes all",
+                  shard.value()->index + 1, shard.value()->count, list.jobs.size(), all));
+  return Done{};
+}
+
 Exit run_bake(Console& console, const BakeArguments& arguments) {
   const auto refuse = [&](const Error& error) {
     console.error(error.remedy.empty() ? error.finding : error.finding + "; " + error.remedy);
@@ -87,11 +109,7 @@ Exit run_bake(Console& console, const BakeArguments& arguments) {
   if (const Outcome ok = check_limits(arguments); !ok) return refuse(ok.error());
   Result<JobList> list = list_jobs(arguments.request);
   if (!list) return refuse(list.error());
-  if (!arguments.shard.empty()) {
-    const Result<Shard> shard = parse_shard(arguments.shard);
-    if (!shard) return refuse(shard.error());
-    keep_shard(list.value(), shard.value());
-  }
+  if (const Outcome ok = take_shard(console, arguments, list.value()); !ok) return refuse(ok.error());
   if (const Outcome ok = check_side_outputs(arguments, list.value()); !ok) return refuse(ok.error());
   if (const Outcome ok = check_folders(list.value(), arguments.request); !ok) return refuse(ok.error());
   if (arguments.dry_run) {
@@ -158,7 +176,8 @@ void add_run_options(CLI::App& app, BakeArguments& arguments) {
   app.add_flag("-n,--dry-run", arguments.dry_run, "Print what would be baked; write nothing");
   app.add_option("--shard", arguments.shard,
                  "Bake only the I-th of N shares of the meshes, as `sqbake plan` deals them out;\n"
-                 "auto: as the job array of Slurm or Kubernetes says")
+                 "auto: as the job array of Slurm or Kubernetes says, which is also the default for\n"
+                 "what a folder, a pattern, a list or a manifest names; 1/1: all")
       ->type_name("I/N");
   app.add_flag("--fail-fast", arguments.fail_fast, "Begin no further mesh once one has failed");
   app.add_flag("--strict", arguments.strict, "A degraded bundle makes the run fail");

@@ -113,8 +113,10 @@ Outcome Lister::add(const std::string& input, const fs::path& base, bool listed)
   const fs::path path = base / input;
   std::error_code code;
   const fs::file_status status = fs::status(path, code);
-  if (fs::is_directory(status)) return add_folder(path, path.string());
-  if (!fs::exists(status) && is_glob(input)) return add_pattern(path, path.string());
+  const bool is_folder = fs::is_directory(status), is_pattern = !fs::exists(status) && is_glob(input);
+  list.is_searched = list.is_searched || listed || is_folder || is_pattern;
+  if (is_folder) return add_folder(path, path.string());
+  if (is_pattern) return add_pattern(path, path.string());
   if (const Outcome ok = check_readable(path); !ok) return ok.error();
   const fs::path relative = fs::path(input).lexically_normal();
   const bool keeps_folders = listed && relative.is_relative() && *relative.begin() != "..";

@@ -21,6 +21,7 @@ struct InputList {
   std::vector<InputMesh> meshes;             ///< in the order they were named, each folder sorted
   std::vector<std::filesystem::path> lists;  ///< list files that were read
   bool is_single_file = false;               ///< one file was named, by its name
+  bool is_searched = false;                  ///< a folder, a pattern or a list was named
 };
 
 /// The extensions that bake::read_mesh knows, for people.

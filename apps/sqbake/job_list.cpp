@@ -190,6 +190,7 @@ Result<JobList> list_jobs(const JobRequest& request) {
   }
   if (!request.manifest.empty())
     if (const Outcome ok = append_manifest(request, config, list.jobs); !ok) return ok.error();
+  list.is_searched = inputs.value().is_searched || !request.manifest.empty();
   list.single_file = inputs.value().is_single_file && request.manifest.empty();
   if (const Outcome ok = check_clashes(list.jobs); !ok) return ok.error();
   std::error_code code;

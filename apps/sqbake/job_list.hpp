@@ -38,6 +38,7 @@ struct Job {
 struct JobList {
   std::vector<Job> jobs;     ///< in order of the command line, each folder sorted by path
   bool single_file = false;  ///< one file was named: its error is the program's error
+  bool is_searched = false;  ///< a folder, a pattern, a list or a manifest was named
 };
 
 /// The jobs of a request. Reads lists and TOML files, but of a mesh no more than whether it can be read, and

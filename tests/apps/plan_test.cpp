@@ -121,8 +121,13 @@ TEST_F(JobArray, OutsideOfOneNothingIsGuessed) {
   EXPECT_FALSE(parse_shard("auto"));
   set({{"SLURM_ARRAY_TASK_ID", "9"}, {"SLURM_ARRAY_TASK_COUNT", "3"}, {"SLURM_ARRAY_TASK_MIN", "1"}});
   EXPECT_FALSE(parse_shard("auto")) << "an array with gaps: --array=1,5,9";
+  EXPECT_FALSE(shard_of_job_array()) << "must not pass for a process outside of any";
   set({{"JOB_COMPLETION_INDEX", "5"}, {"JOB_COMPLETIONS", "5"}});
   EXPECT_FALSE(parse_shard("auto"));
+  EXPECT_FALSE(shard_of_job_array());
+  clear();
+  ASSERT_TRUE(shard_of_job_array());
+  EXPECT_FALSE(shard_of_job_array().value());
 }
 
 AssetRecord record(const std::string& output, const std::string& outcome, const std::string& more = "") {

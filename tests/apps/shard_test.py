@@ -69,15 +69,72 @@ class Shards(FolderTest):
             self.assert_exit(result, 2)
         self.assertFalse((self.folder / "out").exists())
 
-    def submit(self, lost_task="", shards=3):
+    def test_a_task_of_an_array_bakes_its_share_of_what_was_searched_for_and_says_so(self):
+        array = {**os.environ, "SLURM_ARRAY_TASK_COUNT": "3", "SLURM_ARRAY_TASK_MIN": "1", "SLURM_ARRAY_TASK_STEP": "1"}
+        shards = [self.bake("a", env={**array, "SLURM_ARRAY_TASK_ID": str(k)}) for k in (1, 2, 3)]
+        self.assertEqual(shards, [self.bake("b", "--shard", f"{k}/3") for k in (1, 2, 3)])
+        array["SLURM_ARRAY_TASK_ID"] = "2"
+        self.assertEqual(len(self.bake("c", "--shard", "1/1", env=array)), 5)
+        named = [self.models / "m0.off", self.models / "m2.off"]
+        for inputs in (named[:1], named):  # who names a mesh has dealt the meshes out
+            result = run("sqbake", "bake", *inputs, "--out-dir", self.folder / "d", "-n", env=array)
+            self.assertEqual((len(result.stdout.splitlines()), result.stderr), (len(inputs), ""))
+        (self.folder / "list").write_text("\n".join(map(str, self.models.rglob("*.off"))), encoding="utf-8")
+        result = run("sqbake", "bake", f"@{self.folder}/list", "--out-dir", self.folder / "d", "-n", "-q", env=array)
+        self.assertEqual(len(result.stdout.splitlines()), len(shards[1]))
+        self.assertRegex(result.stderr, rf"bakes --shard 2/3, {len(shards[1])} of 5 meshes; --shard 1/1 bakes all")
+        array["SLURM_ARRAY_TASK_ID"] = "9"  # --array=1,5,9
+        self.assert_exit(run("sqbake", "bake", self.models, "--out-dir", self.folder / "d", "-n", env=array), 2)
+
+    def merge(self, *arguments):
+        result = run("sqbake", "merge", *arguments, cwd=self.folder)
+        return result.returncode, result.stderr, result.stdout
+
+    def test_a_merge_of_nothing_or_of_a_run_that_was_cut_short_is_not_complete(self):
+        whole = run("sqbake", "bake", self.models, "--out-dir", self.folder / "out", "--format", "ndjson", *ROUGH).stdout
+        lines = whole.splitlines(keepends=True)
+        for name, text, code, named in (("whole", whole, 0, ""), ("empty", "", 4, "no record of an asset in empty"),
+                                        ("summary", lines[-1], 4, "no record of an asset"),
+                                        ("cut", "".join(lines[:-1]), 1, "cut: has no summary"),
+                                        ("torn", whole[:-9], 1, "torn: has no summary")):
+            with self.subTest(name):
+                (self.folder / name).write_text(text, encoding="utf-8")
+                answer = self.merge(name)
+                self.assertEqual(answer[0], code, answer)
+                self.assertIn(named, answer[1])
+        self.assertEqual(json.loads(self.merge("cut")[2].splitlines()[-1])["unfinished"], ["cut"])
+        plan = run("sqbake", "plan", self.models, "--out-dir", self.folder / "out", "--format", "ndjson").stdout
+        (self.folder / "plan").write_text(plan, encoding="utf-8")
+        self.assertEqual(self.merge("cut", "--plan", "plan")[:2], (0, ""), "the plan tells that all is there")
+        self.assertEqual(self.merge("whole", "--plan", "empty")[0], 4)
+
+    def test_a_merge_finds_two_runs_that_gave_different_bytes_by_their_hashes_alone(self):
+        mesh = self.models / "m0.off"
+        options = ("-o", self.folder / "m.h5", "--format", "ndjson", *ROUGH)
+        record, summary = run("sqbake", "bake", mesh, *options).stdout.splitlines(keepends=True)
+        same = {**json.loads(record), "seconds": 7.0}
+        other = {**json.loads(record), "hash": same["hash"][::-1]}
+        (self.folder / "first").write_text(record + summary, encoding="utf-8")
+        for name, second, code in (("same", same, 0), ("other", other, 1)):
+            (self.folder / name).write_text(json.dumps(second) + "\n" + summary, encoding="utf-8")
+            answer = self.merge("first", name)
+            self.assertEqual(answer[0], code, answer)
+            self.assertEqual("two runs made different bundles" in answer[1], name == "other")
+
+    def test_a_plan_finds_what_a_bake_with_the_same_options_would_refuse(self):
+        plan = ("plan", self.models, "--recursive", "--out-dir", self.folder / "out")
+        self.assert_exit(run("sqbake", *plan, "--quality", "fine", "--timeout", "5m"), 0)
+        self.assert_exit(run("sqbake", *plan, "--max-parts", "0"), 2)
+
+    def submit(self, lost_task="", shards=3, what=None, options=()):
         fake = self.folder / "bin"
         fake.mkdir(exist_ok=True)
         (fake / "sbatch").write_text(STAND_IN, encoding="ascii")
         (fake / "sbatch").chmod(0o755)
         environment = {**os.environ, "PATH": f"{fake}:{BIN}:{os.environ['PATH']}", "LOST_TASK": lost_task,
                        "SLURM_CPUS_PER_TASK": "2"}
-        result = subprocess.run([SLURM / "submit", self.models, self.folder / "farm", str(shards), *ROUGH], env=environment,
-                                capture_output=True, text=True, timeout=TIMEOUT_S, check=False)
+        result = subprocess.run([SLURM / "submit", *(what or [self.models]), self.folder / "farm", str(shards), *ROUGH,
+                                 *options], env=environment, capture_output=True, text=True, timeout=TIMEOUT_S, check=False)
         self.assert_exit(result, 0)
         return result.stdout.strip()
 
@@ -95,6 +152,18 @@ class Shards(FolderTest):
         self.assertEqual({a["output"] for a in assets if not a["cached"]}, set(missing),
                          "the second run bakes what the first did not")
         self.assertIn("<table", (records / "report.html").read_text(encoding="utf-8"))
+
+    def test_the_slurm_scripts_take_manifests_and_options_that_name_the_bundles(self):
+        manifest = self.models / "props, and more.toml"
+        manifest.write_text('[[asset]]\ninput = "m0.off"\n[[asset]]\ninput = "below/m1.off"\n', encoding="ascii")
+        self.assertEqual(self.submit(what=["--manifest", manifest], options=["--keep-extension"]), "merge ended with 0")
+        self.assertEqual(sorted(self.bundles(self.folder / "farm")), ["below/m1.off.h5", "m0.off.h5"])
+        records = self.folder / "farm" / "records"
+        before = {path.name: path.read_bytes() for path in records.iterdir()}
+        for options in (["--max-parts", "0"], ["--quality", "fein"]):
+            with self.assertRaises(AssertionError):
+                self.submit(options=options)
+        self.assertEqual({path.name: path.read_bytes() for path in records.iterdir()}, before, "nothing was submitted")
 
     def test_an_earlier_run_in_more_shards_does_not_speak_for_this_one(self):
         self.assertEqual(self.submit(shards=4), "merge ended with 0")

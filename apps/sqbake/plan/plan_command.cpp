@@ -12,6 +12,7 @@
 #include "../../common/json_text.hpp"
 #include "../commands.hpp"
 #include "../job_list.hpp"
+#include "../settings.hpp"
 #include "shard_jobs.hpp"
 
 namespace sqmap::apps {
@@ -35,6 +36,7 @@ Exit run_plan(Console& console, const PlanArguments& arguments) {
     if (!shard) return refuse(shard.error());
     only = shard.value();
   }
+  if (const auto ok = options_from(arguments.request.config.command_line); !ok) return refuse(ok.error());
   const Result<JobList> list = list_jobs(arguments.request);
   if (!list) return refuse(list.error());
   const std::uint32_t count = only ? only->count : arguments.shards;
@@ -94,6 +96,8 @@ std::function<Exit(Console&)> declare_plan(CLI::App& app) {
   app.add_option("--out-dir", request.out_dir, "As of `sqbake bake`")->type_name("DIR")->required();
   app.add_flag("--recursive", request.recursive, "Look below the folders named, too");
   app.add_flag("--keep-extension", request.keep_extension, "Call the bundles NAME.off.h5, not NAME.h5");
+  // They decide nothing here, but who plans a bake finds out what is wrong with them before it begins.
+  add_all_setting_options(app, request.config.command_line);
   app.add_option("--config", request.config.project, "As of `sqbake bake`")->type_name("FILE.toml");
   app.add_flag("!--no-config", request.config.use_files, "As of `sqbake bake`");
   CLI::Option* shards = app.add_option("--shards", args->shards, "Number of shards (default 1)")

@@ -29,29 +29,39 @@ std::optional<std::uint32_t> variable(const char* name) {
   return text != nullptr ? number(text) : std::nullopt;
 }
 
-Result<Shard> shard_of_job_array() {
+}  // namespace
+
+Result<std::optional<Shard>> shard_of_job_array() {
   if (const auto id = variable("SLURM_ARRAY_TASK_ID"), count = variable("SLURM_ARRAY_TASK_COUNT");
       id && count) {
     const std::uint32_t first = variable("SLURM_ARRAY_TASK_MIN").value_or(0);
     const std::uint32_t step = std::max(1U, variable("SLURM_ARRAY_TASK_STEP").value_or(1));
-    if (*id >= first && (*id - first) / step < *count) return Shard{(*id - first) / step, *count};
-    return Error{Status::kBadOption,
-                 fmt::format("--shard auto: SLURM_ARRAY_TASK_ID={} is beyond the {} tasks from {} by {}", *id,
-                             *count, first, step),
-                 "use an array without gaps, such as --array=1-8"};
+    if (*id >= first && (*id - first) / step < *count)
+      return std::optional<Shard>({(*id - first) / step, *count});
+    return Error{
+        Status::kBadOption,
+        fmt::format("SLURM_ARRAY_TASK_ID={} is beyond the {} tasks from {} by {}", *id, *count, first, step),
+        "use an array without gaps, such as --array=1-8, or say --shard I/N"};
   }
   if (const auto index = variable("JOB_COMPLETION_INDEX"), count = variable("JOB_COMPLETIONS");
-      index && count)
-    if (*index < *count) return Shard{*index, *count};
-  return Error{
-      Status::kBadOption, "--shard auto: this is no task of a job array",
-      "start it by sbatch --array, set JOB_COMPLETION_INDEX and JOB_COMPLETIONS, or say --shard I/N"};
+      index && count) {
+    if (*index < *count) return std::optional<Shard>({*index, *count});
+    return Error{Status::kBadOption,
+                 fmt::format("JOB_COMPLETION_INDEX={} is beyond JOB_COMPLETIONS={}", *index, *count),
+                 "set JOB_COMPLETIONS to the job's number of completions"};
+  }
+  return std::optional<Shard>();
 }
 
-}  // namespace
-
 Result<Shard> parse_shard(std::string_view text) {
-  if (text == "auto") return shard_of_job_array();
+  if (text == "auto") {
+    const Result<std::optional<Shard>> shard = shard_of_job_array();
+    if (!shard) return shard.error();
+    if (shard.value()) return *shard.value();
+    return Error{
+        Status::kBadOption, "--shard auto: this is no task of a job array",
+        "start it by sbatch --array, set JOB_COMPLETION_INDEX and JOB_COMPLETIONS, or say --shard I/N"};
+  }
   const std::size_t slash = text.find('/');
   if (slash != std::string_view::npos) {
     const auto index = number(text.substr(0, slash)), count = number(text.substr(slash + 1));

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -21,6 +22,9 @@ struct Shard {
 /// (SLURM_ARRAY_TASK_ID, _MIN, _STEP, _COUNT), or of a Kubernetes indexed job (JOB_COMPLETION_INDEX, and
 /// JOB_COMPLETIONS, which the job must set). Errors: kBadOption.
 Result<Shard> parse_shard(std::string_view text);
+
+/// What "auto" says; nothing where no array's variables are set. Errors: kBadOption, for an array with gaps.
+Result<std::optional<Shard>> shard_of_job_array();
 
 struct WorkItem {
   std::string name;       ///< unique
