@@ -41,13 +41,19 @@ inline constexpr float kLeastDoubt = 1e-6F;  ///< of the part's sphere
 inline constexpr float kBesidePole =
     0.05F;  ///< cells: on a pole the columns have no length, and no direction
 inline constexpr int kThirdLayerSteps =
-    5;  ///< Gauss-Newton converges in one or two; the rest crosses cells and creases
+    8;  ///< Gauss-Newton converges in one or two; the rest crosses cells and creases
 inline constexpr float kMostCells = 2;     ///< of one such step
 inline constexpr float kBackStep = 0.35F;  ///< what is kept of a step that leads farther from the point
 inline constexpr float kLeastAngle =
     1e-6F;  ///< squared sine between rows and columns, below which one is a pole
 /// Cells: shorter steps end the search.
 inline constexpr float kLeastCellStep = 0.03F;
+/// The normal of a patch is replaced by the direction to its nearest point where the cosine between them is
+/// less than kBack, unless the point is so near, as a share of far_from(), that its side is in doubt.
+inline constexpr float kBack = -0.5F, kNearShare = 0.1F;
+/// Rings of eight cells, 2^ring cells away, around a foot whose cell bounds no patch.
+inline constexpr int kRings = 4;
+
 /// Layer 1: F(p) <= 1 (FORMAT.md S1), from powers of the unit coordinates.
 inline bool in_superquadric(const PartRecord& part, const Vec3f& p) noexcept {
   const float x = std::abs(p.x) * part.inverse_axes.x, y = std::abs(p.y) * part.inverse_axes.y,
@@ -91,7 +97,8 @@ class Chart {
   bool patch_point(float row, float col, Vec3f& point) const noexcept;
   /// Beyond this distance, about a cell, a walk may have ended on the wrong surface.
   static float far_from(const PartRecord& part, std::uint32_t stride) noexcept {
-    return part.sphere_radius * (2 * static_cast<float>(stride) / static_cast<float>(part.rows));
+    const Vec3f& a = part.semi_axes;
+    return lesser(lesser(a.x, a.y), a.z) * (5 * static_cast<float>(stride) / static_cast<float>(part.rows));
   }
   /// delta of QueryOptions::edge_length_m at a place of the map.
   float offset(float row, float col, std::uint32_t level, float edge) const noexcept;
@@ -116,7 +123,7 @@ class Chart {
 
   Cell cell_at(float row, float col, std::uint32_t stride) const noexcept;
   Start start_at(const Vec3f& p, float row, float col, std::uint32_t stride) const noexcept;
-  /// In the nearest of the eight cells around that of (row, col).
+  /// In the nearest of the eight cells of the first ring around (row, col) that has one with a patch.
   Start start_beside(const Vec3f& p, float row, float col, std::uint32_t stride) const noexcept;
   Patch patch_at(const Cell& cell, float row, float col, std::uint32_t stride) const noexcept;
   /// Outward unit normal of the represented surface at (row, col) of the cell.
@@ -351,15 +358,19 @@ inline Chart::Start Chart::start_beside(const Vec3f& p, float row, float col,
   const float mid_row = static_cast<float>(middle.row) + size / 2,
               mid_col = static_cast<float>(middle.col) + size / 2;
   Start best;
-  for (int k = 0; k < 9; ++k) {
-    if (k == 4) continue;  // the middle
-    const float here_row = mid_row + static_cast<float>(k / 3 - 1) * size;
-    float here_col = mid_col + static_cast<float>(k % 3 - 1) * size;
-    here_col = here_col < 0 ? here_col + turn : here_col;
-    here_col = here_col < turn ? here_col : here_col - turn;
-    if (!(here_row > 0 && here_row < static_cast<float>(part_.rows - 1))) continue;
-    const Start start = start_at(p, here_row, here_col, stride);
-    if (start.square < best.square) best = start;
+  for (int ring = 0; ring < kRings && !std::isfinite(best.square); ++ring) {
+    const auto step = static_cast<float>(stride << ring);
+    for (int k = 0; k < 9; ++k) {
+      if (k == 4) continue;  // the middle
+      const int rows_up = k / 3 - 1;
+      const float here_row = mid_row + static_cast<float>(rows_up) * step;
+      float here_col = mid_col + static_cast<float>(k % 3 - 1) * step;
+      here_col = here_col < 0 ? here_col + turn : here_col;
+      here_col = here_col < turn ? here_col : here_col - turn;
+      if (!(here_row > 0 && here_row < static_cast<float>(part_.rows - 1) && here_col >= 0)) continue;
+      const Start start = start_at(p, here_row, here_col, stride);
+      if (start.square < best.square) best = start;
+    }
   }
   return best;
 }
@@ -403,7 +414,20 @@ inline void Chart::third_layer(const Vec3f& p, std::uint32_t stride, ChartAnswer
     next_col = next_col < 0.0F ? next_col + turn : next_col;
     next_col = next_col < turn ? next_col : next_col - turn;
     Cell next = cell_at(next_row, next_col, stride);
-    const bool stays = !next.eligible;
+    bool stays = !next.eligible;
+    if (stays) {  // half the way, where that is another cell
+      const float half_row = lesser(greater(row + 0.5F * d_row, 0.0F), last_row);
+      float half_col = col + 0.5F * d_col;
+      half_col = half_col < 0.0F ? half_col + turn : half_col;
+      half_col = half_col < turn ? half_col : half_col - turn;
+      const Cell between = cell_at(half_row, half_col, stride);
+      if (between.eligible && between.texel[0] != cell.texel[0]) {
+        next = between;
+        next_row = half_row;
+        next_col = half_col;
+        stays = false;
+      }
+    }
     if (stays) {  // on the rim of the patch
       const auto low_row = static_cast<float>(cell.row), low_col = static_cast<float>(cell.col);
       next = cell;
@@ -433,6 +457,11 @@ inline void Chart::third_layer(const Vec3f& p, std::uint32_t stride, ChartAnswer
   answer.row = row;
   answer.col = col;
   answer.normal = patch_normal(cell, row, col, stride);
+  // A patch that is folded over itself shows its back.
+  const Vec3f out = answer.inside ? point - p : p - point;
+  if (dot(out, answer.normal) < kBack * answer.distance &&
+      answer.distance > kNearShare * far_from(part_, stride))
+    answer.normal = normalized(out);
   if (stride == 1) vertex_fan(p, cell, answer);
 }
 

@@ -234,7 +234,8 @@ SQMAP_KERNEL Look Looker::look(const V3& p, M wanted, float reach) const noexcep
   if (reach > 0)
     look.flags = hn::Or(look.flags, flag(hn::Lt(all(part_.depth_min) - foot.depth, all(reach)), kWithin));
   look.start = all_int(StartTable::kNone);
-  const M inner = hn::And(inside, wanted);
+  // What the bounds prove may yet turn a point outside into one inside.
+  const M inner = part_.bound_cells > 0 ? wanted : hn::And(inside, wanted);
   if (third_ && !none(inner)) look.start = pick(inner, start_of(foot.row, foot.col, foot.depth), look.start);
   const V sure = pick(as_float(mixed), most(foot.depth, zero), all(part_.sphere_radius));
   look.certainty = least(gap, sure) / most(doubt, all(kLeastDoubt * part_.sphere_radius));

@@ -140,8 +140,24 @@ HWY_INLINE M Walker::advance(Walk& walk, VCell& cell, M active) const noexcept {
   const V raised = pick(hn::Lt(moved, zero), moved + turn, moved);
   V next_col = pick(hn::Lt(raised, turn), raised, raised - turn);
   VCell next = looker_.cell_at(next_row, next_col);
-  const M stays = hn::Not(looker_.read(next).eligible);
-  if (!none(hn::And(stays, active))) {
+  M stays = hn::And(active, hn::Not(looker_.read(next).eligible));
+  if (!none(stays)) {  // half the way, where that is another cell
+    const V half_row = limited(walk.row + all(0.5F) * walk.d_row, zero, all(looker_.last_row()));
+    const V half_moved = walk.col + all(0.5F) * walk.d_col;
+    const V half_raised = pick(hn::Lt(half_moved, zero), half_moved + turn, half_moved);
+    const V half_col = pick(hn::Lt(half_raised, turn), half_raised, half_raised - turn);
+    VCell between = looker_.cell_at(half_row, half_col);
+    const M open = looker_.read(between).eligible;
+    const M leaves = as_float(hn::Or(hn::Ne(between.row, cell.row), hn::Ne(between.col, cell.col)));
+    const M goes = hn::And(stays, hn::And(open, leaves));
+    next_row = pick(goes, half_row, next_row);
+    next_col = pick(goes, half_col, next_col);
+    next.row = pick(goes, between.row, next.row);
+    next.col = pick(goes, between.col, next.col);
+    for (int k = 0; k < 4; ++k) next.depth[k] = pick(goes, between.depth[k], next.depth[k]);
+    stays = hn::AndNot(goes, stays);
+  }
+  if (!none(stays)) {
     const V low_row = to_float(cell.row), low_col = to_float(cell.col);
     const V rim_row = limited(walk.row + walk.d_row, low_row, low_row + size);
     const V rim_col = limited(moved, low_col, low_col + size);
@@ -235,30 +251,36 @@ HWY_NOINLINE void Walker::go_on() noexcept {
 
 /// Chart::start_beside, which moves (row, col). The lanes that found a start.
 HWY_NOINLINE M Walker::find_beside(const V3& p, M lanes, V& row, V& col) const noexcept {
-  const float size = looker_.size();
-  const V half = all(size / 2), turn = all(looker_.turn()), zero = hn::Zero(kD);
+  const V half = all(looker_.size() / 2), turn = all(looker_.turn()), zero = hn::Zero(kD);
   const VCell middle = looker_.cell_at(row, col);
   const V mid_row = to_float(middle.row) + half, mid_col = to_float(middle.col) + half;
-  V best = all(std::numeric_limits<float>::infinity());
-  for (int k = 0; k < 9; ++k) {
-    if (k == 4) continue;  // the middle
-    const int rows_up = k / 3 - 1;
-    const V here_row = mid_row + all(static_cast<float>(rows_up) * size);
-    V here_col = mid_col + all(static_cast<float>(k % 3 - 1) * size);
-    here_col = pick(hn::Lt(here_col, zero), here_col + turn, here_col);
-    here_col = pick(hn::Lt(here_col, turn), here_col, here_col - turn);
-    M open = hn::And(lanes, hn::And(hn::Gt(here_row, zero), hn::Lt(here_row, all(looker_.last_row()))));
-    VCell cell = looker_.cell_at(here_row, here_col);
-    open = hn::And(open, looker_.read(cell).eligible);
-    if (none(open)) continue;
-    const V3 error = p - looker_.patch_at(cell, here_row, here_col).point;
-    const V square = dot3(error, error);
-    const M better = hn::And(open, hn::Lt(square, best));
-    best = pick(better, square, best);
-    row = pick(better, here_row, row);
-    col = pick(better, here_col, col);
+  const V infinity = all(std::numeric_limits<float>::infinity());
+  V best = infinity;
+  M seeking = lanes;
+  for (int ring = 0; ring < kRings && !none(seeking); ++ring) {
+    const V step = all(static_cast<float>(looker_.stride() << ring));
+    for (int k = 0; k < 9; ++k) {
+      if (k == 4) continue;  // the middle
+      const int rows_up = k / 3 - 1;
+      const V here_row = mid_row + all(static_cast<float>(rows_up)) * step;
+      V here_col = mid_col + all(static_cast<float>(k % 3 - 1)) * step;
+      here_col = pick(hn::Lt(here_col, zero), here_col + turn, here_col);
+      here_col = pick(hn::Lt(here_col, turn), here_col, here_col - turn);
+      M open = hn::And(hn::Gt(here_row, zero), hn::Lt(here_row, all(looker_.last_row())));
+      open = hn::And(seeking, hn::And(open, hn::Ge(here_col, zero)));
+      VCell cell = looker_.cell_at(here_row, here_col);
+      open = hn::And(open, looker_.read(cell).eligible);
+      if (none(open)) continue;
+      const V3 error = p - looker_.patch_at(cell, here_row, here_col).point;
+      const V square = dot3(error, error);
+      const M better = hn::And(open, hn::Lt(square, best));
+      best = pick(better, square, best);
+      row = pick(better, here_row, row);
+      col = pick(better, here_col, col);
+    }
+    seeking = hn::AndNot(hn::Lt(best, infinity), seeking);
   }
-  return hn::And(lanes, hn::Lt(best, all(std::numeric_limits<float>::infinity())));
+  return hn::And(lanes, hn::Lt(best, infinity));
 }
 
 /// From the foot or, where that is nearer to an inner point, from where the table of starts says.
@@ -342,6 +364,13 @@ HWY_NOINLINE void Walker::end(const Walk& walk, VI entry, M lanes) noexcept {
       looker_.read(cell);
       normal = pick(beside_pole, looker_.patch_normal(cell, walk.row, walk.col), normal);
     }
+    const VI flags = hn::GatherIndex(kDI, entries_.flags, pick(lanes, entry, hn::Set(kDI, kNobody)));
+    const M inside = as_float(hn::Ne(hn::And(flags, all_int(kInside)), hn::Zero(kDI)));
+    const V3 out = pick(inside, walk.point - walk.p, walk.p - walk.point);
+    const V distance = hn::Sqrt(walk.square);
+    M turned = hn::Lt(dot3(out, normal), all(kBack) * distance);
+    turned = hn::And(turned, hn::Gt(distance, all(kNearShare * Chart::far_from(part_, looker_.stride()))));
+    if (!none(hn::And(turned, lanes))) normal = pick(turned, normalized3(out), normal);
   }
   write(entry, lanes, walk.row, walk.col, walk.on_rim, hn::Sqrt(walk.square), walk.point, normal);
 }
