@@ -13,7 +13,9 @@
 namespace sqmap::bake {
 namespace {
 
-using Triangle = std::array<Vec3d, 3>;
+/// Indexed by axis: the axes that a ray is tested along are known only at run time.
+using Corner = std::array<double, 3>;
+using Triangle = std::array<Corner, 3>;
 
 /// Embree's own triangle test works in float and, aimed at a vertex, missed all faces round it for 1 % of the
 /// rays measured, robust mode or not. So it is given only the boxes of the triangles, grown by this share of
@@ -32,7 +34,7 @@ constexpr double kSamePlace = 1e-12;
 /// passes it.
 class ExactRay {
  public:
-  ExactRay(const Vec3d& origin, const Vec3d& direction) : origin_(origin) {
+  ExactRay(const Vec3d& origin, const Vec3d& direction) {
     if (std::abs(direction.y) > std::abs(direction.x)) z_ = 1;
     if (std::abs(direction.z) > std::abs(direction[z_])) z_ = 2;
     x_ = (z_ + 1) % 3;
@@ -41,6 +43,7 @@ class ExactRay {
     per_z_ = 1 / direction[z_];
     shear_x_ = direction[x_] * per_z_;
     shear_y_ = direction[y_] * per_z_;
+    from_ = {origin[x_], origin[y_], origin[z_]};
   }
 
   /// Whether the ray's line crosses the triangle, and if so where and in which direction.
@@ -61,9 +64,9 @@ class ExactRay {
     double x, y, z;
   };
 
-  Point project(const Vec3d& p) const {
-    const Vec3d r = p - origin_;
-    return {r[x_] - shear_x_ * r[z_], r[y_] - shear_y_ * r[z_], r[z_]};
+  Point project(const Corner& p) const {
+    const double x = p[x_] - from_.x, y = p[y_] - from_.y, z = p[z_] - from_.z;
+    return {x - shear_x_ * z, y - shear_y_ * z, z};
   }
   /// Of the axis and the edge a b. Exchanging a and b changes the sign and nothing else, as long as the
   /// compiler does not contract one product of the two (-ffp-contract=off).
@@ -75,8 +78,8 @@ class ExactRay {
     return sign(b.x - a.x);                  // and with e^2
   }
 
-  Vec3d origin_;
   int x_ = 0, y_ = 0, z_ = 0;
+  Vec3d from_;  ///< the origin along these axes
   double shear_x_ = 0, shear_y_ = 0, per_z_ = 0;
 };
 
@@ -90,19 +93,19 @@ struct Query {
 
 void bound(const RTCBoundsFunctionArguments* arguments) {
   const Triangle& triangle = static_cast<const Triangle*>(arguments->geometryUserPtr)[arguments->primID];
-  Vec3d low = triangle[0], high = low;
-  for (const Vec3d& p : triangle)
-    for (int axis = 0; axis < 3; ++axis) {
+  Corner low = triangle[0], high = low;
+  for (const Corner& p : triangle)
+    for (std::size_t axis = 0; axis < 3; ++axis) {
       low[axis] = std::min(low[axis], p[axis]);
       high[axis] = std::max(high[axis], p[axis]);
     }
   RTCBounds& box = *arguments->bounds_o;
-  box.lower_x = static_cast<float>(low.x - kBoxMargin);
-  box.lower_y = static_cast<float>(low.y - kBoxMargin);
-  box.lower_z = static_cast<float>(low.z - kBoxMargin);
-  box.upper_x = static_cast<float>(high.x + kBoxMargin);
-  box.upper_y = static_cast<float>(high.y + kBoxMargin);
-  box.upper_z = static_cast<float>(high.z + kBoxMargin);
+  box.lower_x = static_cast<float>(low[0] - kBoxMargin);
+  box.lower_y = static_cast<float>(low[1] - kBoxMargin);
+  box.lower_z = static_cast<float>(low[2] - kBoxMargin);
+  box.upper_x = static_cast<float>(high[0] + kBoxMargin);
+  box.upper_y = static_cast<float>(high[1] + kBoxMargin);
+  box.upper_z = static_cast<float>(high[2] + kBoxMargin);
 }
 
 /// Notes a crossing and leaves the ray as it is, so that Embree goes on through all boxes on its way.
@@ -163,9 +166,14 @@ struct RayTracer::Impl {
     if (!(size_m > std::numeric_limits<double>::min())) size_m = 1;  // a point: any size will do
     triangles.reserve(faces.size());
     for (const auto& [a, b, c] : faces)
-      triangles.push_back({unit(mesh.vertices_m[a]), unit(mesh.vertices_m[b]), unit(mesh.vertices_m[c])});
+      triangles.push_back(
+          {corner(mesh.vertices_m[a]), corner(mesh.vertices_m[b]), corner(mesh.vertices_m[c])});
   }
   Vec3d unit(const Vec3d& p_m) const { return (1 / size_m) * (p_m - centre_m); }
+  Corner corner(const Vec3d& p_m) const {
+    const Vec3d p = unit(p_m);
+    return {p.x, p.y, p.z};
+  }
 
   /// All crossings with t >= first_t, which is 0 or -infinity.
   void trace(const Vec3d& origin_m, const Vec3d& direction, double first_t, std::vector<Hit>& hits) const;
