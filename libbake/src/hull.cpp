@@ -9,6 +9,7 @@
 #include <cmath>
 #include <cstddef>
 #include <iterator>
+#include <limits>
 #include <utility>
 
 #include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
@@ -47,24 +48,24 @@ Vec3d vec(const Point& p) { return {p.x(), p.y(), p.z()}; }
 /// Quickhull (Barber et al. 1996): each face keeps the points that it sees; the farthest of them replaces all
 /// the faces that see it by the cone from it to their outline. Points seen by a face that went are kept by a
 /// new face or lie inside: on its way out of the hull from the old face, such a point crosses only new faces.
-/// Sidedness is exact; distances only choose the order.
+/// Sidedness is exact: where rounding could decide, exact arithmetic does. Distances only choose the order.
 class Quickhull {
  public:
   struct Face {
     std::array<Index, 3> corner;  ///< counter-clockwise from outside
     std::array<Index, 3> across;  ///< face beyond the edge corner[i], corner[i + 1]
     std::vector<Index> outside;
+    Vec3d normal;  ///< cross product of the edges from corner[0]
     bool is_alive{true};
   };
 
   /// @param seed  four points that span a volume
-  Quickhull(const Points& points, std::array<Index, 4> seed) : points_(points), face_from_(points.size()) {
+  Quickhull(const Points& points, std::array<Index, 4> seed)
+      : points_(points), surely_(height_error(points)), face_from_(points.size()) {
     auto& [a, b, c, d] = seed;
     if (CGAL::orientation(points[a], points[b], points[c], points[d]) == CGAL::POSITIVE) std::swap(a, b);
-    faces_ = {{{a, b, c}, {1, 2, 3}, {}},
-              {{b, a, d}, {0, 3, 2}, {}},
-              {{c, b, d}, {0, 1, 3}, {}},
-              {{a, c, d}, {0, 2, 1}, {}}};
+    faces_ = {new_face({a, b, c}, {1, 2, 3}), new_face({b, a, d}, {0, 3, 2}), new_face({c, b, d}, {0, 1, 3}),
+              new_face({a, c, d}, {0, 2, 1})};
     std::vector<Index> all(points.size());
     for (Index i = 0; i < all.size(); ++i) all[i] = i;
     assign(all, 0);
@@ -76,7 +77,36 @@ class Quickhull {
   const std::vector<Face>& faces() const { return faces_; }
 
  private:
+  /// Bound of the rounding error of height(): with differences of coordinates up to x, y and z it sums 6
+  /// products of at most xyz, each with at most 8 roundings of 1.2e-16. Infinite where products could
+  /// underflow.
+  static double height_error(const Points& points) {
+    Vec3d low = vec(points[0]), high = low;
+    for (const Point& point : points) {
+      const Vec3d p = vec(point);
+      low = {std::min(low.x, p.x), std::min(low.y, p.y), std::min(low.z, p.z)};
+      high = {std::max(high.x, p.x), std::max(high.y, p.y), std::max(high.z, p.z)};
+    }
+    const Vec3d size = high - low;
+    const double least = std::min({size.x, size.y, size.z}), most = std::max({size.x, size.y, size.z});
+    constexpr double kSafe = 1e-90;
+    return least > kSafe && most < 1 / kSafe ? 1e-14 * size.x * size.y * size.z
+                                             : std::numeric_limits<double>::infinity();
+  }
+
+  Face new_face(const std::array<Index, 3>& corner, const std::array<Index, 3>& across) const {
+    const Vec3d a = vec(points_[corner[0]]);
+    return {corner, across, {}, cross(vec(points_[corner[1]]) - a, vec(points_[corner[2]]) - a)};
+  }
+
+  /// Of a point above the plane of a face, times twice the face's area.
+  double height(const Face& f, Index p) const {
+    return dot(f.normal, vec(points_[p]) - vec(points_[f.corner[0]]));
+  }
+
   bool sees(Index face, Index p) const {
+    const double rounded = height(faces_[face], p);
+    if (std::abs(rounded) > surely_) return rounded > 0;
     const auto& c = faces_[face].corner;
     return CGAL::orientation(points_[c[0]], points_[c[1]], points_[c[2]], points_[p]) == CGAL::POSITIVE;
   }
@@ -92,13 +122,10 @@ class Quickhull {
   }
 
   Index farthest(Index face) const {
-    const auto& c = faces_[face].corner;
-    const Vec3d a = vec(points_[c[0]]);
-    const Vec3d normal = cross(vec(points_[c[1]]) - a, vec(points_[c[2]]) - a);
-    const std::vector<Index>& outside = faces_[face].outside;
-    const auto height = [&](Index p) { return dot(normal, vec(points_[p]) - a); };
+    const Face& f = faces_[face];
+    const std::vector<Index>& outside = f.outside;
     return *std::max_element(outside.begin(), outside.end(),
-                             [&](Index p, Index q) { return height(p) < height(q); });
+                             [&](Index p, Index q) { return height(f, p) < height(f, q); });
   }
 
   void add_point(Index p, Index start) {
@@ -135,11 +162,12 @@ class Quickhull {
     for (std::size_t side = 0; side < 3; ++side)
       if (neighbour.corner.at(side) == b) neighbour.across.at(side) = added;
     face_from_[a] = added;
-    faces_.push_back({{a, b, p}, {beyond, added, added}, {}});
+    faces_.push_back(new_face({a, b, p}, {beyond, added, added}));
   }
 
   const Points& points_;
   std::vector<Face> faces_;
+  double surely_;                 ///< greater heights have the right sign
   std::vector<Index> face_from_;  ///< of the newest faces, the one whose outer edge starts at a vertex
 };
 
