@@ -23,43 +23,73 @@ constexpr std::size_t kHullPoints = 400;
 constexpr std::array<double, 7> kQuantiles{0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8};
 constexpr std::array<double, 3> kNextQuantiles{0.3, 0.5, 0.7};
 
-/// Where the half-spaces overlap.
-using Region = std::vector<HalfSpace>;
+/// A triangle of a solid.
+struct Facet {
+  Vec3d centroid_m;
+  double twice_area_m2;
+  std::array<std::uint32_t, 3> corner;  ///< of Sliced::vertices_m
+  bool is_cap;
+};
 
-bool holds(const Region& region, const Vec3d& p_m) {
-  return std::all_of(region.begin(), region.end(), [&](const HalfSpace& h) { return h.above_m(p_m) < 0; });
-}
+/// A solid made ready to be cut in mind by many planes.
+struct Sliced {
+  std::vector<Vec3d> vertices_m;  ///< in the order of the set they come from
+  std::vector<Facet> facets;
+
+  Sliced(const SolidSet& set, const Solid& solid) {
+    std::vector<std::uint32_t> ids;
+    for (const auto& t : solid.triangles) ids.insert(ids.end(), t.begin(), t.end());
+    std::sort(ids.begin(), ids.end());
+    ids.erase(std::unique(ids.begin(), ids.end()), ids.end());
+    for (const std::uint32_t id : ids) vertices_m.push_back(set.vertices_m[id]);
+    for (std::size_t k = 0; k < solid.triangles.size(); ++k) {
+      const auto& t = solid.triangles[k];
+      const Vec3d &a = set.vertices_m[t[0]], &b = set.vertices_m[t[1]], &c = set.vertices_m[t[2]];
+      Facet facet{set.centroid(t), norm(cross(b - a, c - a)), {}, solid.face[k] == kNewFace};
+      for (std::size_t i = 0; i < 3; ++i)
+        facet.corner[i] =
+            static_cast<std::uint32_t>(std::lower_bound(ids.begin(), ids.end(), t[i]) - ids.begin());
+      facets.push_back(facet);
+    }
+  }
+};
+
+/// Where the half-spaces overlap, and the triangles of the mesh with their centroids there.
+struct Region {
+  std::vector<HalfSpace> half_spaces;
+  std::vector<std::uint32_t> mesh_facets;
+
+  explicit Region(const Sliced& solid) {
+    for (std::uint32_t k = 0; k < solid.facets.size(); ++k)
+      if (!solid.facets[k].is_cap) mesh_facets.push_back(k);
+  }
+  Region(const Sliced& solid, const Region& whole, const HalfSpace& side) : half_spaces(whole.half_spaces) {
+    half_spaces.push_back(side);
+    for (const std::uint32_t k : whole.mesh_facets)
+      if (side.above_m(solid.facets[k].centroid_m) < 0) mesh_facets.push_back(k);
+  }
+  bool holds(const Vec3d& p_m) const {
+    return std::all_of(half_spaces.begin(), half_spaces.end(),
+                       [&](const HalfSpace& h) { return h.above_m(p_m) < 0; });
+  }
+};
 
 HalfSpace other_side(const HalfSpace& h) { return {-h.normal, -h.height_m}; }
 
-Region with(Region region, const HalfSpace& h) {
-  region.push_back(h);
-  return region;
-}
-
-/// Principal axes of the centroids of triangles in the region, weighted by area.
-std::array<Vec3d, 3> principal_axes(const SolidSet& set, const Solid& solid, const Region& region) {
-  struct Mass {
-    Vec3d at_m;
-    double area;  // twice
-  };
-  std::vector<Mass> masses;
+/// Principal axes of the centroids, weighted by area.
+std::array<Vec3d, 3> principal_axes(const std::vector<const Facet*>& facets) {
   Vec3d mean;
   double weight = 0;
-  for (const auto& t : solid.triangles) {
-    const Vec3d at_m = set.centroid(t);
-    if (!holds(region, at_m)) continue;
-    const Vec3d &a = set.vertices_m[t[0]], &b = set.vertices_m[t[1]], &c = set.vertices_m[t[2]];
-    masses.push_back({at_m, norm(cross(b - a, c - a))});
-    mean = mean + masses.back().area * at_m;
-    weight += masses.back().area;
+  for (const Facet* facet : facets) {
+    mean = mean + facet->twice_area_m2 * facet->centroid_m;
+    weight += facet->twice_area_m2;
   }
   mean = (1 / weight) * mean;
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
-  for (const Mass& mass : masses) {
-    const Vec3d d = mass.at_m - mean;
+  for (const Facet* facet : facets) {
+    const Vec3d d = facet->centroid_m - mean;
     const Eigen::Vector3d v(d.x, d.y, d.z);
-    covariance += mass.area / weight * v * v.transpose();
+    covariance += facet->twice_area_m2 / weight * v * v.transpose();
   }
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(covariance);
   std::array<Vec3d, 3> axes;
@@ -83,22 +113,20 @@ std::vector<Vec3d> clipped(const std::vector<Vec3d>& polygon_m, const HalfSpace&
 }
 
 /// Of what SolidSet::split would leave of the solid in the region.
-double hull_volume_m3(const SolidSet& set, const Solid& solid, const Region& region) {
-  std::vector<std::uint32_t> ids;
+double hull_volume_m3(const Sliced& solid, const Region& region) {
   std::vector<Vec3d> cut_m;
-  for (std::size_t k = 0; k < solid.triangles.size(); ++k) {
-    const auto& t = solid.triangles[k];
-    if (solid.face[k] != kNewFace) {
-      if (holds(region, set.centroid(t))) ids.insert(ids.end(), t.begin(), t.end());
-      continue;
-    }
-    std::vector<Vec3d> polygon_m{set.vertices_m[t[0]], set.vertices_m[t[1]], set.vertices_m[t[2]]};
-    for (const HalfSpace& h : region) polygon_m = clipped(polygon_m, h);
+  for (const Facet& facet : solid.facets) {
+    if (!facet.is_cap) continue;
+    std::vector<Vec3d> polygon_m;
+    for (const std::uint32_t corner : facet.corner) polygon_m.push_back(solid.vertices_m[corner]);
+    for (const HalfSpace& h : region.half_spaces) polygon_m = clipped(polygon_m, h);
     cut_m.insert(cut_m.end(), polygon_m.begin(), polygon_m.end());
   }
-  std::sort(ids.begin(), ids.end());
-  ids.erase(std::unique(ids.begin(), ids.end()), ids.end());
-  for (const std::uint32_t id : ids) cut_m.push_back(set.vertices_m[id]);
+  std::vector<std::uint8_t> is_corner(solid.vertices_m.size(), 0);
+  for (const std::uint32_t k : region.mesh_facets)
+    for (const std::uint32_t corner : solid.facets[k].corner) is_corner[corner] = 1;
+  for (std::size_t k = 0; k < is_corner.size(); ++k)
+    if (is_corner[k] != 0) cut_m.push_back(solid.vertices_m[k]);
   const std::size_t stride = std::max<std::size_t>(1, cut_m.size() / kHullPoints);
   std::vector<Vec3d> points_m;
   for (std::size_t k = 0; k < cut_m.size(); k += stride) points_m.push_back(cut_m[k]);
@@ -112,32 +140,25 @@ struct Cut {
 };
 
 /// Cuts of the solid's share of the region at each quantile along each principal axis, axis by axis.
-std::vector<Cut> plane_cuts(const SolidSet& set, const Solid& solid, const Region& region,
-                            std::span<const double> quantiles) {
-  std::vector<Vec3d> mesh_centroids_m;
-  std::vector<Vec3d> centroids_m;
-  for (std::size_t k = 0; k < solid.triangles.size(); ++k) {
-    const Vec3d at_m = set.centroid(solid.triangles[k]);
-    if (!holds(region, at_m)) continue;
-    centroids_m.push_back(at_m);
-    if (solid.face[k] != kNewFace) mesh_centroids_m.push_back(at_m);
-  }
-  if (mesh_centroids_m.size() < 2) return {};
-  const std::array<Vec3d, 3> axes = principal_axes(set, solid, region);
+std::vector<Cut> plane_cuts(const Sliced& solid, const Region& region, std::span<const double> quantiles) {
+  if (region.mesh_facets.size() < 2) return {};
+  std::vector<const Facet*> facets;
+  for (const Facet& facet : solid.facets)
+    if (region.holds(facet.centroid_m)) facets.push_back(&facet);
+  const std::array<Vec3d, 3> axes = principal_axes(facets);
   std::vector<Cut> cuts(axes.size() * quantiles.size());
   tbb::parallel_for(std::size_t{0}, cuts.size(), [&](std::size_t c) {
     const Vec3d& axis = axes[c / quantiles.size()];
     double low = std::numeric_limits<double>::infinity(), high = -low;
-    for (const Vec3d& at_m : centroids_m) {
-      low = std::min(low, dot(axis, at_m));
-      high = std::max(high, dot(axis, at_m));
+    for (const Facet* facet : facets) {
+      low = std::min(low, dot(axis, facet->centroid_m));
+      high = std::max(high, dot(axis, facet->centroid_m));
     }
     const HalfSpace plane{axis, low + quantiles[c % quantiles.size()] * (high - low)};
-    const auto below = std::count_if(mesh_centroids_m.begin(), mesh_centroids_m.end(),
-                                     [&](const Vec3d& at_m) { return plane.above_m(at_m) < 0; });
-    if (below == 0 || below == static_cast<std::ptrdiff_t>(mesh_centroids_m.size())) return;
-    cuts[c] = {plane, hull_volume_m3(set, solid, with(region, plane)) +
-                          hull_volume_m3(set, solid, with(region, other_side(plane)))};
+    const Region below(solid, region, plane);
+    if (below.mesh_facets.empty() || below.mesh_facets.size() == region.mesh_facets.size()) return;
+    cuts[c] = {plane, hull_volume_m3(solid, below) +
+                          hull_volume_m3(solid, Region(solid, region, other_side(plane)))};
   });
   return cuts;
 }
@@ -145,10 +166,9 @@ std::vector<Cut> plane_cuts(const SolidSet& set, const Solid& solid, const Regio
 bool encloses_less(const Cut& a, const Cut& b) { return a.volume_m3 < b.volume_m3; }
 
 /// Hull volume in the region, or of the halves where cutting it once more encloses less.
-double volume_after_next_cut_m3(const SolidSet& set, const Solid& solid, const Region& region) {
-  double least = hull_volume_m3(set, solid, region);
-  for (const Cut& cut : plane_cuts(set, solid, region, kNextQuantiles))
-    least = std::min(least, cut.volume_m3);
+double volume_after_next_cut_m3(const Sliced& solid, const Region& region) {
+  double least = hull_volume_m3(solid, region);
+  for (const Cut& cut : plane_cuts(solid, region, kNextQuantiles)) least = std::min(least, cut.volume_m3);
   return least;
 }
 
@@ -202,7 +222,9 @@ std::vector<Cell> close_segments(SolidSet& set, const Solid& whole, const Decomp
 }
 
 std::vector<HalfSpace> plane_cuts_by_merit(const SolidSet& set, const Solid& solid) {
-  std::vector<Cut> cuts = plane_cuts(set, solid, {}, kQuantiles);
+  const Sliced sliced(set, solid);
+  const Region whole(sliced);
+  std::vector<Cut> cuts = plane_cuts(sliced, whole, kQuantiles);
   // The best of each axis is judged by what one more cut of both sides leaves. Halving a ring across gains
   // nothing at once and much at the next cut; slicing it flat gains nothing at either.
   std::vector<Cut> best_of_axis;
@@ -210,8 +232,8 @@ std::vector<HalfSpace> plane_cuts_by_merit(const SolidSet& set, const Solid& sol
     const auto first = cuts.begin() + static_cast<std::ptrdiff_t>(begin);
     Cut cut = *std::min_element(first, first + kQuantiles.size(), encloses_less);
     if (std::isinf(cut.volume_m3)) continue;
-    cut.volume_m3 = volume_after_next_cut_m3(set, solid, {cut.plane}) +
-                    volume_after_next_cut_m3(set, solid, {other_side(cut.plane)});
+    cut.volume_m3 = volume_after_next_cut_m3(sliced, Region(sliced, whole, cut.plane)) +
+                    volume_after_next_cut_m3(sliced, Region(sliced, whole, other_side(cut.plane)));
     best_of_axis.push_back(cut);
   }
   std::stable_sort(best_of_axis.begin(), best_of_axis.end(), encloses_less);
