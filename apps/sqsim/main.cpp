@@ -120,6 +120,12 @@ Exit parse_and_run(Console& console, int argc, char** argv) {
       ->check(CLI::Range(1e-3, 1e5).description(""))
       ->type_name("S");
   app.add_flag("--fast", arguments.run.is_fast, "Do not wait for the time of the next frame");
+  app.add_option(
+         "--runs", arguments.run.runs,
+         "Repeat a probe's run, and tell each frame's shortest time: what the system takes of one run "
+         "is not in it")
+      ->check(CLI::Range(1, 1000).description(""))
+      ->type_name("N");
   app.add_option("-o,--output", arguments.run.output, "Folder for trace.csv, trace.svg and last_frame.glb")
       ->type_name("DIR");
   app.add_option("--bundles", arguments.bundles, "Where bundles are (default: beside the scene file)")

@@ -22,6 +22,7 @@ struct LoadedScene {
 
 struct RunOptions {
   bool is_fast = false;          ///< frames follow each other without waiting for their time
+  int runs = 1;                  ///< of a probe; those after the first do not wait
   std::filesystem::path output;  ///< folder for the trace, the plot and the picture; empty: none
 };
 

@@ -235,6 +235,17 @@ void read_query(const Json& json, const std::string& where, runtime::QueryOption
   reader.finish();
 }
 
+BudgetEntry read_budget(const Json& json, const std::string& where, Problem& problem) {
+  Reader reader(json, where, problem);
+  BudgetEntry budget;
+  if (reader.has("microseconds") == reader.has("units"))
+    reader.fail("", "must have either microseconds or units");
+  budget.microseconds = reader.number("microseconds", 0, 1, 1e6);
+  budget.units = static_cast<std::uint64_t>(reader.whole("units", 0, 0, 1000000000));
+  reader.finish();
+  return budget;
+}
+
 SceneFile read_scene(const Json& json, Problem& problem) {
   Reader reader(json, "scene", problem);
   SceneFile scene;
@@ -246,6 +257,9 @@ SceneFile read_scene(const Json& json, Problem& problem) {
   scene.seconds = reader.number("seconds", scene.seconds, 1e-3, 1e5);
   reader.object("query", [&](const Json& query, const std::string& at) {
     read_query(query, at, scene.options.query, problem);
+  });
+  reader.object("budget", [&](const Json& budget, const std::string& at) {
+    scene.budget = read_budget(budget, at, problem);
   });
   reader.each("objects", 1, [&](const Json& object, const std::string& at) {
     scene.objects.push_back(read_object(object, at, problem));
@@ -262,6 +276,7 @@ SceneFile read_scene(const Json& json, Problem& problem) {
   });
   if (scene.cloth && !scene.options.effects.empty())
     reader.fail("effects", "belong to a probe; a cloth has its friction");
+  if (scene.cloth && scene.budget) reader.fail("budget", "belongs to a probe");
   reader.finish();
   return scene;
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <optional>
 #include <string>
@@ -50,11 +51,19 @@ struct ClothEntry {
   double friction = 0.5;
 };
 
+/// What the contacts of a frame may cost: a time, turned into units of work by what frames before it took, or
+/// the units themselves, which give the same run on every machine.
+struct BudgetEntry {
+  double microseconds = 0;  ///< 0: units
+  std::uint64_t units = 0;
+};
+
 /// A scene as samples/scenes/scene.schema.json describes it.
 struct SceneFile {
   double rate_hz = 1000, seconds = 10;
   std::vector<ObjectEntry> objects;
   runtime::SceneOptions options;
+  std::optional<BudgetEntry> budget;  ///< of a probe
   std::optional<ProbeEntry> probe;
   std::optional<ClothEntry> cloth;
 };

@@ -2,11 +2,13 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
 #include <fmt/format.h>
 
+#include "sqmap/runtime/budget.hpp"
 #include "sqmap/runtime/scene.hpp"
 
 #include "../common/files.hpp"
@@ -29,34 +31,42 @@ Outcome write_outputs(const LoadedScene& scene, const std::vector<TraceRow>& row
   return write_file(folder / "last_frame.glb", glb.value());
 }
 
-}  // namespace
+/// What a run comes to besides its rows.
+struct RunReport {
+  std::size_t missed{}, overslept{};
+  std::size_t part_count{}, resident_bytes{};
+};
 
-Outcome run_probe(Console& console, const LoadedScene& loaded, const RunOptions& options) {
+/// Runs the scene once, from its start, into `rows`.
+Result<RunReport> run_once(const LoadedScene& loaded, const runtime::Probe& probe, bool is_fast,
+                           std::span<TraceRow> rows) {
   const ProbeEntry& entry = *loaded.file.probe;
   std::vector<runtime::SceneObject> objects;
   for (const DrawnObject& object : loaded.objects) objects.push_back({object.asset, object.placement});
-  runtime::Probe probe =
-      entry.mesh.empty() ? runtime::Probe{entry.points_m} : probe_of(loaded.probe, entry.zone_m);
-  const std::size_t points = probe.points_m.size();
-  Result<runtime::Scene> built = runtime::Scene::build(objects, std::move(probe), loaded.file.options);
+  Result<runtime::Scene> built = runtime::Scene::build(objects, probe, loaded.file.options);
   if (!built) return built.error();
   runtime::Scene& scene = built.value();
 
-  const double rate_hz = loaded.file.rate_hz, step_s = 1 / rate_hz;
-  const auto frames = static_cast<std::size_t>(std::llround(loaded.file.seconds * rate_hz));
-  std::vector<TraceRow> rows(std::max<std::size_t>(frames, 1));
+  const double step_s = 1 / loaded.file.rate_hz;
   std::optional<CoupledProbe> coupled;
   if (entry.coupling) coupled.emplace(*entry.coupling, pose_at(entry.keyframes, 0));
+  const std::optional<BudgetEntry>& allowed = loaded.file.budget;
+  runtime::WorkRate rate;
 
-  FrameClock clock(rate_hz, options.is_fast);
+  FrameClock clock(loaded.file.rate_hz, is_fast);
   for (std::size_t i = 0; i < rows.size(); ++i) {
     TraceRow& row = rows[i];
     row.time_s = static_cast<double>(i) * step_s;
     clock.begin();
     const Pose handle = pose_at(entry.keyframes, row.time_s);
     row.pose = coupled ? coupled->pose() : handle;
+    runtime::WorkBudget budget;
+    if (allowed)
+      budget.units = allowed->microseconds > 0 ? rate.units_for(allowed->microseconds) : allowed->units;
+    const Vec3d& about_m = row.pose.translation_m;
     const runtime::FrameResult result =
-        scene.frame(row.pose, row.pose.translation_m, static_cast<float>(step_s));
+        allowed ? scene.frame(row.pose, about_m, static_cast<float>(step_s), budget)
+                : scene.frame(row.pose, about_m, static_cast<float>(step_s));
     if (coupled)
       coupled->step(handle, cast<double>(result.wrench.force_n), cast<double>(result.wrench.torque_nm),
                     step_s);
@@ -64,11 +74,42 @@ Outcome run_probe(Console& console, const LoadedScene& loaded, const RunOptions&
     row.torque_nm = result.wrench.torque_nm;
     row.contacts = result.inside;
     row.layer = static_cast<int>(result.layer);
+    row.work_units = budget.spent;
     row.microseconds = clock.end();
+    rate.learn(budget.spent, row.microseconds);
     for (std::size_t k = 0; k < objects.size(); ++k)
       for (const runtime::Contact& contact : scene.contacts(k))
         row.deepest_m = std::max(row.deepest_m, static_cast<double>(contact.depth_m));
   }
+  return RunReport{clock.missed(), clock.overslept(), scene.part_count(), scene.resident_bytes()};
+}
+
+/// How many frames had to do with which layer.
+std::string budget_text(const BudgetEntry& budget, std::span<const TraceRow> rows) {
+  std::size_t frames[4] = {};
+  std::uint64_t most = 0;
+  for (const TraceRow& row : rows) {
+    ++frames[static_cast<std::size_t>(row.layer)];
+    most = std::max(most, row.work_units);
+  }
+  return fmt::format(
+      "budget of {}: first contact by layer 1 in {} frames, 2 in {}, 3 in {}; most work {} units\n",
+      budget.microseconds > 0 ? fmt::format("{} us", budget.microseconds)
+                              : fmt::format("{} units", budget.units),
+      frames[1], frames[2], frames[3], most);
+}
+
+}  // namespace
+
+Outcome run_probe(Console& console, const LoadedScene& loaded, const RunOptions& options) {
+  const ProbeEntry& entry = *loaded.file.probe;
+  const runtime::Probe probe =
+      entry.mesh.empty() ? runtime::Probe{entry.points_m} : probe_of(loaded.probe, entry.zone_m);
+  const double rate_hz = loaded.file.rate_hz;
+  const auto frames = static_cast<std::size_t>(std::llround(loaded.file.seconds * rate_hz));
+  std::vector<TraceRow> rows(std::max<std::size_t>(frames, 1));
+  const Result<RunReport> report = run_once(loaded, probe, options.is_fast, rows);
+  if (!report) return report.error();
 
   std::vector<double> microseconds;
   std::size_t touching = 0;
@@ -78,17 +119,36 @@ Outcome run_probe(Console& console, const LoadedScene& loaded, const RunOptions&
     touching += row.contacts > 0 ? 1 : 0;
     deepest_m = std::max(deepest_m, row.deepest_m);
   }
-  const Jumps jumps = force_jumps(rows);
+  const RunReport& run = report.value();
   console.out(fmt::format("{} objects of {} parts, {:.1f} KiB; probe of {} points; {} frames at {} Hz{}\n",
-                          loaded.objects.size(), scene.part_count(),
-                          static_cast<double>(scene.resident_bytes()) / 1024, points, rows.size(), rate_hz,
-                          options.is_fast ? ", not waited for" : ""));
+                          loaded.objects.size(), run.part_count,
+                          static_cast<double>(run.resident_bytes) / 1024, probe.points_m.size(), rows.size(),
+                          rate_hz, options.is_fast ? ", not waited for" : ""));
   console.out(latency_text(microseconds));
-  console.out(fmt::format("missed deadlines: {} ({} of them begun late by the system)\n", clock.missed(),
-                          clock.overslept()));
+  console.out(
+      fmt::format("missed deadlines: {} ({} of them begun late by the system)\n", run.missed, run.overslept));
+  if (options.runs > 1) {
+    std::vector<TraceRow> again(rows.size());
+    for (int k = 1; k < options.runs; ++k) {
+      std::ranges::fill(again, TraceRow{});
+      const Result<RunReport> repeated = run_once(loaded, probe, true, again);
+      if (!repeated) return repeated.error();
+      for (std::size_t i = 0; i < again.size(); ++i)
+        microseconds[i] = std::min(microseconds[i], again[i].microseconds);
+    }
+    console.out(
+        fmt::format("each frame's shortest time in {} runs: median {:.1f} us, 99.9 % {:.1f} us, worst "
+                    "{:.1f} us\n",
+                    options.runs, percentile(microseconds, 0.5), percentile(microseconds, 0.999),
+                    percentile(microseconds, 1)));
+  }
+  if (loaded.file.budget) console.out(budget_text(*loaded.file.budget, rows));
+  const Jumps jumps = force_jumps(rows);
   console.out(fmt::format(
-      "in contact: {} frames, at most {:.1f} mm deep; force jumps > 10 %: {} of {} steps in contact\n",
-      touching, 1e3 * deepest_m, jumps.jumps, jumps.steps));
+      "in contact: {} frames, at most {:.1f} mm deep; force jumps > 10 %: {} of {} steps in contact, {} of "
+      "them "
+      "above {} N; largest change {:.2f} N\n",
+      touching, 1e3 * deepest_m, jumps.jumps, jumps.steps, jumps.firm_jumps, kFirm_n, jumps.most_n));
   return options.output.empty() ? Outcome(Done{}) : write_outputs(loaded, rows, options.output);
 }
 

@@ -62,16 +62,16 @@ std::string trace_csv(std::span<const TraceRow> rows) {
   std::string text =
       "time_s,x_m,y_m,z_m,qw,qx,qy,qz,force_x_n,force_y_n,force_z_n,torque_x_nm,torque_y_nm,torque_z_nm,"
       "contacts,"
-      "layer,microseconds,deepest_m\n";
+      "layer,microseconds,deepest_m,work_units\n";
   for (const TraceRow& row : rows) {
     const Vec3d& p = row.pose.translation_m;
     const Quaternion& q = row.pose.orientation;
     fmt::format_to(std::back_inserter(text), "{:.6f},{:.7g},{:.7g},{:.7g},{:.7g},{:.7g},{:.7g},{:.7g},",
                    row.time_s, p.x, p.y, p.z, q.w, q.x, q.y, q.z);
     fmt::format_to(std::back_inserter(text),
-                   "{:.6g},{:.6g},{:.6g},{:.6g},{:.6g},{:.6g},{},{},{:.2f},{:.6g}\n", row.force_n.x,
+                   "{:.6g},{:.6g},{:.6g},{:.6g},{:.6g},{:.6g},{},{},{:.2f},{:.6g},{}\n", row.force_n.x,
                    row.force_n.y, row.force_n.z, row.torque_nm.x, row.torque_nm.y, row.torque_nm.z,
-                   row.contacts, row.layer, row.microseconds, row.deepest_m);
+                   row.contacts, row.layer, row.microseconds, row.deepest_m, row.work_units);
   }
   return text;
 }
@@ -107,7 +107,11 @@ Jumps force_jumps(std::span<const TraceRow> rows) {
     if (rows[i].contacts == 0 || rows[i - 1].contacts == 0) continue;
     ++result.steps;
     const float larger_n = std::max(norm(rows[i].force_n), norm(rows[i - 1].force_n));
-    result.jumps += norm(rows[i].force_n - rows[i - 1].force_n) > 0.1F * larger_n ? 1 : 0;
+    const float change_n = norm(rows[i].force_n - rows[i - 1].force_n);
+    result.most_n = std::max(result.most_n, static_cast<double>(change_n));
+    if (!(change_n > 0.1F * larger_n)) continue;
+    ++result.jumps;
+    result.firm_jumps += static_cast<double>(larger_n) > kFirm_n ? 1 : 0;
   }
   return result;
 }

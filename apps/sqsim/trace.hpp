@@ -17,7 +17,8 @@ struct TraceRow {
   std::uint32_t contacts{};
   int layer{};
   double microseconds{};
-  double deepest_m{};  ///< of the contacts; 0 without
+  double deepest_m{};          ///< of the contacts; 0 without
+  std::uint64_t work_units{};  ///< spent of the budget; 0 without one
 };
 
 /// CSV with a header line.
@@ -29,7 +30,13 @@ std::string trace_svg(std::span<const TraceRow> rows, const std::string& title);
 /// Steps between two frames in contact in which the force changes by more than a tenth of the larger one.
 struct Jumps {
   std::size_t steps{}, jumps{};
+  std::size_t
+      firm_jumps{};  ///< of them, those at more than kFirm_n: not the first and last frames of a touch
+  double most_n{};   ///< largest change of any step in contact
 };
+/// A force that grows with depth from nothing changes by more than a tenth for a while, whatever is done;
+/// from here on it need not.
+inline constexpr double kFirm_n = 1;
 Jumps force_jumps(std::span<const TraceRow> rows);
 
 }  // namespace sqmap::apps

@@ -81,6 +81,22 @@ class Simulation(FolderTest):
         self.assertEqual((rows[0]["contacts"], rows[-1]["contacts"], rows[-1]["layer"]), (0, 1, 1))
         self.assertEqual(rows[-1]["force_z_n"], 0)
 
+    def test_a_budget_decides_the_layer_and_is_kept(self):
+        # A point in one superquadric is a block, and 2, 4 or 9 units by layer.
+        for budget, spent, layer in [(10, 10, 3), (9, 5, 2), (5, 5, 2), (4, 3, 1), (0, 3, 1)]:
+            with self.subTest(budget=budget):
+                content = scene(budget={"units": budget})
+                del content["probe"]["coupling"]
+                last = self.rows(content)[-1]
+                self.assertEqual((last["contacts"], last["layer"], last["work_units"]), (1, layer, spent))
+                self.assertEqual(last["force_z_n"] > 0, layer > 1)
+                self.assertIn(f"budget of {budget} units: ", self.result.stdout)
+
+    def test_a_budget_of_time_is_learned_and_runs_may_be_repeated(self):
+        rows = self.rows(scene(budget={"microseconds": 500}), "--runs", 3)
+        self.assertEqual((rows[-1]["layer"], rows[-1]["work_units"]), (3, 10))
+        self.assertRegex(self.result.stdout, r"each frame's shortest time in 3 runs: median [\d.]+ us, ")
+
     def test_waits_for_the_time_of_each_frame(self):
         self.bake(sphere(3, RADIUS_M), "ball", *ROUGH)
         path = self.folder / "scene.json"
@@ -128,9 +144,17 @@ class ShippedScenes(unittest.TestCase):
             return [{key: float(value) for key, value in row.items()} for row in csv.DictReader(file)]
 
     def test_readmes_line_lets_the_hand_touch(self):
-        rows = self.rows("object_recognition", "--seconds", "2.5", "--rate", "200")
-        self.assertEqual(len(rows), 500)
+        rows = self.rows("object_recognition", "--seconds", "8", "--rate", "500")
+        self.assertEqual(len(rows), 4000)
         self.assertGreater(max(row["contacts"] for row in rows), 10)
+
+    def test_the_hand_feels_every_object(self):
+        rows = self.rows("object_recognition", "--rate", "500")
+        content = json.loads((SCENES / "object_recognition.json").read_text(encoding="utf-8"))
+        for item in content["objects"]:
+            near = [row for row in rows if abs(row["x_m"] - item["position_m"][0]) < 0.5]
+            self.assertGreater(sum(row["contacts"] > 0 for row in near), 200, item["name"])
+        self.assertGreater(rows[-1]["contacts"], 0)  # for the picture
 
     def test_readmes_line_lets_the_cloth_touch(self):
         rows = self.rows("costume_designer", "--seconds", "0.4")
@@ -164,6 +188,7 @@ class SceneFiles(FolderTest):
         for content, named in [
                 ("{", "JSON"), ("[]", "must be an object"), (scene(schema="sqmap.scene/2"), "sqmap.scene/1"),
                 (scene(rate_hz=-1), "[1, 100000]"), (scene(objects=[]), "scene.objects"),
+                (scene(budget={}), "microseconds or units"), (scene(budget={"units": -1}), "scene.budget.units"),
                 (scene(probe=None), "probe or cloth"), (scene(query={"layer": 4}), "scene.query.layer"),
                 (scene(effects={"texture": {"amplitude_m": "much"}}), "scene.effects.texture.amplitude_m"),
                 (scene(objects=[{"bundle": "ball.h5", "orientation_wxyz": [0, 0, 0, 0]}]), "orientation_wxyz")]:
