@@ -56,12 +56,18 @@ Cloth::Cloth(const ClothEntry& entry) : impl_(std::make_unique<Impl>()) {
   for (int i = 0; i < body.m_nodes.size(); ++i)
     nodes_m_.push_back(cast<float>(from_bullet(body.m_nodes[i].m_x)));
   before_m_ = nodes_m_;
+  anchor_m_.resize(nodes_m_.size());
+  was_held_.resize(nodes_m_.size());
+  is_held_.resize(nodes_m_.size());
 }
 
 Cloth::~Cloth() = default;
 
 void Cloth::step(double step_s) {
   before_m_ = nodes_m_;
+  was_held_.swap(is_held_);
+  std::ranges::fill(is_held_, char{0});
+  step_s_ = step_s;
   impl_->world.stepSimulation(static_cast<btScalar>(step_s), 0);
   const auto& nodes = impl_->body->m_nodes;
   for (int i = 0; i < nodes.size(); ++i)
@@ -71,15 +77,25 @@ void Cloth::step(double step_s) {
 Vec3d Cloth::push_out(std::size_t node, double by_m, const Vec3d& normal, double friction) {
   btSoftBody::Node& n = impl_->body->m_nodes[static_cast<int>(node)];
   const Vec3d v = from_bullet(n.m_v);
-  const double inward = std::max(-dot(v, normal), 0.0);
-  const Vec3d along = v - dot(v, normal) * normal;
-  const double speed = norm(along);
-  const double kept = speed > 0 ? std::max(0.0, 1 - friction * inward / speed) : 0;
-  const Vec3d after = (dot(v, normal) + inward) * normal + kept * along;
-  const Vec3d x = from_bullet(n.m_x) + by_m * normal;
+  const double outward = std::max(dot(v, normal), 0.0);
+  Vec3d x = from_bullet(n.m_x) + by_m * normal;
+  Vec3d along;
+  if (was_held_[node] != 0) {
+    const Vec3d moved = x - anchor_m_[node];
+    const Vec3d slid = moved - dot(moved, normal) * normal;
+    const double way_m = norm(slid), most_m = friction * by_m;
+    const double left = way_m > most_m ? 1 - most_m / way_m : 0;
+    x = x - (1 - left) * slid;
+    along = (left / step_s_) * slid;
+  } else {  // it arrives: what it loses is a share of the momentum it brought
+    const Vec3d brought = v - dot(v, normal) * normal;
+    const double speed = norm(brought), inward = std::max(-dot(v, normal), 0.0);
+    along = speed > 0 ? std::max(0.0, 1 - friction * inward / speed) * brought : Vec3d{};
+  }
+  hold(node, x);
   n.m_x = to_bullet(x);
+  const Vec3d after = outward * normal + along;
   n.m_v = to_bullet(after);
-  nodes_m_[node] = cast<float>(x);
   return n.m_im > 0 ? (1 / static_cast<double>(n.m_im)) * (after - v) : Vec3d{};
 }
 
@@ -88,8 +104,14 @@ Vec3d Cloth::put_back(std::size_t node) {
   const Vec3d v = from_bullet(n.m_v);
   n.m_x = to_bullet(cast<double>(before_m_[node]));
   n.m_v = {0, 0, 0};
-  nodes_m_[node] = before_m_[node];
+  hold(node, cast<double>(before_m_[node]));
   return n.m_im > 0 ? (-1 / static_cast<double>(n.m_im)) * v : Vec3d{};
+}
+
+void Cloth::hold(std::size_t node, const Vec3d& at_m) {
+  anchor_m_[node] = at_m;
+  is_held_[node] = 1;
+  nodes_m_[node] = cast<float>(at_m);
 }
 
 TriangleSurface Cloth::surface() const {

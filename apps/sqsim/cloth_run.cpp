@@ -4,11 +4,16 @@
 #include <cmath>
 #include <cstdint>
 #include <deque>
+#include <optional>
+#include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <fmt/format.h>
 
+#include "sqmap/runtime/body.hpp"
+#include "sqmap/runtime/contact.hpp"
 #include "sqmap/runtime/instance.hpp"
 
 #include "../common/files.hpp"
@@ -21,13 +26,12 @@
 namespace sqmap::apps {
 namespace {
 
-/// The objects, and room for the answers of a frame.
+/// The objects, the cloth as a body that deforms, and room for the contacts of a frame.
 struct Obstacles {
   std::deque<runtime::Object> objects;  // instances keep their addresses
   std::vector<runtime::Instance> instances;
-  std::vector<float> distance_m;
-  std::vector<Vec3f> normal;
-  std::vector<std::uint8_t> inside;
+  std::optional<runtime::PointBody> nodes;
+  std::vector<runtime::Contact> contacts;
 };
 
 Outcome build(const LoadedScene& loaded, Obstacles& obstacles) {
@@ -52,25 +56,22 @@ struct Collided {
 Collided collide(Cloth& cloth, Obstacles& obstacles, const ClothEntry& entry,
                  const runtime::QueryOptions& query) {
   Collided result;
+  const auto thickness_m = static_cast<float>(entry.thickness_m);
   for (const runtime::Instance& instance : obstacles.instances) {
-    instance.query(
-        cloth.nodes_m(),
-        {.signed_distance_m = obstacles.distance_m, .normal = obstacles.normal, .inside = obstacles.inside},
-        query);
-    for (std::size_t i = 0; i < obstacles.distance_m.size(); ++i) {
-      const double gap_m = entry.thickness_m - static_cast<double>(obstacles.distance_m[i]);
-      if (gap_m > 0) {
-        result.impulse_n_s =
-            result.impulse_n_s + cloth.push_out(i, gap_m, cast<double>(obstacles.normal[i]), entry.friction);
-      } else if (std::isnan(gap_m) && obstacles.inside[i] != 0) {  // beside a seam: inside, depth unknown
-        result.impulse_n_s = result.impulse_n_s + cloth.put_back(i);
-      } else {
-        continue;
-      }
-      ++result.contacts;
-      result.deepest_m =
-          std::max(result.deepest_m, -static_cast<double>(obstacles.distance_m[i]));  // NaN: as it was
+    if (!obstacles.nodes->refit(cloth.nodes_m())) break;  // a node that is not finite
+    const std::size_t found =
+        instance.contacts(*obstacles.nodes, {}, obstacles.contacts, {query, thickness_m});
+    for (const runtime::Contact& contact : std::span(obstacles.contacts).first(found)) {
+      // Beside a seam: inside, depth unknown.
+      const bool is_unknown = contact.depth_m == 0 && contact.surface_m == contact.position_m;
+      const Vec3d impulse_n_s =
+          is_unknown ? cloth.put_back(contact.point)
+                     : cloth.push_out(contact.point, entry.thickness_m + static_cast<double>(contact.depth_m),
+                                      cast<double>(contact.normal), entry.friction);
+      result.impulse_n_s = result.impulse_n_s + impulse_n_s;
+      result.deepest_m = std::max(result.deepest_m, static_cast<double>(contact.depth_m));
     }
+    result.contacts += static_cast<std::uint32_t>(found);
   }
   return result;
 }
@@ -91,9 +92,10 @@ Outcome run_cloth(Console& console, const LoadedScene& loaded, const RunOptions&
   Cloth cloth(entry);
   runtime::QueryOptions query = loaded.file.options.query;
   query.edge_length_m = static_cast<float>(entry.edge_m / (entry.nodes_along_edge - 1));
-  obstacles.distance_m.resize(cloth.nodes_m().size());
-  obstacles.normal.resize(cloth.nodes_m().size());
-  obstacles.inside.resize(cloth.nodes_m().size());
+  Result<runtime::PointBody> nodes = runtime::PointBody::build(cloth.nodes_m());
+  if (!nodes) return nodes.error();
+  obstacles.nodes.emplace(std::move(nodes).value());
+  obstacles.contacts.resize(cloth.nodes_m().size());
 
   const double step_s = 1 / loaded.file.rate_hz;
   const auto frames = static_cast<std::size_t>(std::llround(loaded.file.seconds * loaded.file.rate_hz));

@@ -113,6 +113,18 @@ class Simulation(FolderTest):
         self.assertAlmostEqual(mean, 0.2 * 9.81, delta=0.1 * 0.2 * 9.81)
         self.assertGreater(rows[-1]["contacts"], 20)
 
+    def test_a_cloth_on_a_slope_stays_within_the_cone_of_friction_and_slides_beyond(self):
+        # About 20 degrees, where friction of 1 holds up to 45, one of 0.1 up to 6.
+        for friction, way_m in [(1, (-1e-3, 1e-3)), (0.1, (0.05, 1))]:
+            with self.subTest(friction=friction):
+                rows = self.rows(scene(probe=None, effects=None, rate_hz=120, seconds=0.5,
+                                       cloth={"centre_m": [0.17, 0, RADIUS_M], "edge_m": 0.2, "nodes_along_edge": 11,
+                                              "mass_kg": 0.05, "thickness_m": 0, "friction": friction}))
+                self.assertGreater(rows[40]["contacts"], 20)
+                slid_m = rows[40]["x_m"] - rows[20]["x_m"]
+                self.assertGreater(slid_m, way_m[0])
+                self.assertLess(slid_m, way_m[1])
+
 
 class ShippedScenes(unittest.TestCase):
     """The scenes as README runs them, in a tree like that of a build, with rough bakes of the samples."""
@@ -160,6 +172,11 @@ class ShippedScenes(unittest.TestCase):
         rows = self.rows("costume_designer", "--seconds", "0.4")
         self.assertEqual(len(rows), 48)
         self.assertGreater(rows[-1]["contacts"], 10)
+
+    def test_the_cloth_stays_on_its_figure(self):
+        rows = self.rows("costume_designer")
+        self.assertGreater(min(row["contacts"] for row in rows[240:]), 100)
+        self.assertLess(abs(rows[-1]["z_m"] - rows[240]["z_m"]), 0.01)
 
 
 class SceneFiles(FolderTest):
