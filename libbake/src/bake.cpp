@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <sstream>
 
 #include <tbb/parallel_for.h>
 
@@ -46,6 +47,10 @@ constexpr double kWrongSides = 15;
 // to this share of R_max first, as far as the number of added triangles allows.
 constexpr double kLongestEdge = 1.0 / 16;
 constexpr std::size_t kMostAddedFaces = 20000;
+
+// The runtime and the tree of closest points square lengths in float: a thousandth of this squared is still
+// normal.
+constexpr double kLeastSize_m = 1e-15;
 
 /// Names the stages and keeps their wall times.
 class Stages {
@@ -267,6 +272,11 @@ Result<BakeResult> bake(const SourceMesh& source, const BakeOptions& asked, cons
   const OpenPlaces open(prepared.mesh);
   const MeshQueries queries{prepared.mesh, rays, oracle, open};
   const double r_max_m = largest_vertex_distance(prepared.mesh);
+  if (!(r_max_m >= kLeastSize_m)) {  // NaN: refuse
+    std::ostringstream finding;
+    finding << "the mesh is " << r_max_m << " m across, must be at least " << kLeastSize_m << " m";
+    return Error{Status::kInvalidMesh, finding.str(), "give the unit that its coordinates are in"};
+  }
   if (asked.conservative && !open.none()) {
     const MeshRecord& found = prepared.record;
     return Error{Status::kInvalidMesh,
