@@ -206,11 +206,16 @@ std::vector<std::uint16_t> label_input_faces(const std::vector<std::uint16_t>& o
   return labels;
 }
 
+struct Drawn {
+  double depth_in_aims;  ///< mean error of depth near the surface over what it may be
+  bool by_budget;        ///< the byte budget decided
+};
+
 /// The maps that the target asks for. What they lose beside seams, where one chart ends and the next has not
 /// begun, shows only between parts: as long as the error of the whole exceeds the target, and finer maps
-/// lower it, they are drawn for a stricter one. True: the byte budget decided.
-Result<bool> draw_maps(Asset& asset, const std::vector<double>& areas_m2, const MeshQueries& queries,
-                       const MapTarget& target, std::uint64_t seed) {
+/// lower it, they are drawn for a stricter one.
+Result<Drawn> draw_maps(Asset& asset, const std::vector<double>& areas_m2, const MeshQueries& queries,
+                        const MapTarget& target, std::uint64_t seed) {
   const ShellPoints shell = sample_shell(queries, kShellWidth * asset.r_max_m, kShellPoints, seed);
   std::vector<Part> best;
   double depth_in_aims = 0, sides_in_aims = 0;
@@ -238,7 +243,21 @@ Result<bool> draw_maps(Asset& asset, const std::vector<double>& areas_m2, const 
     if (by_budget || std::max(depth, sides) <= 1) break;
   }
   asset.parts = std::move(best);
-  return by_budget;
+  return Drawn{depth_in_aims, by_budget};
+}
+
+/// The asset with the superquadrics that its partition was judged by. The full fits are smaller, but one in
+/// many sees so little of the surface that no map of it meets the target.
+Asset with_quick_fits(const Asset& asset, const std::vector<Piece>& pieces) {
+  Asset quick = asset;
+  for (std::size_t k = 0; k < pieces.size(); ++k) {
+    Part part = pieces[k].quick->part;
+    part.vertex_count = asset.parts[k].vertex_count;
+    part.face_count = asset.parts[k].face_count;
+    quick.parts[k] = std::move(part);
+  }
+  quick.sphere = enclosing_sphere(quick.parts);
+  return quick;
 }
 
 Provenance provenance(const SourceMesh& source, const BakeOptions& options) {
@@ -318,10 +337,22 @@ Result<BakeResult> bake(const SourceMesh& source, const BakeOptions& asked, cons
   count_members(asset.parts, prepared.mesh, owner);
   asset.face_labels = label_input_faces(owner, prepared.mesh, source.source_face_count);
   const double target_m = options.max_error_percent / 100 * r_max_m;
-  auto by_budget =
-      draw_maps(asset, surface_areas(pieces, fine), queries, {target_m, options.max_bytes}, options.seed);
-  if (!by_budget) return by_budget.error();
-  if (by_budget.value()) result.stopped_by = "bytes";
+  const MapTarget target{target_m, options.max_bytes};
+  const std::vector<double> areas_m2 = surface_areas(pieces, fine);
+  auto drawn = draw_maps(asset, areas_m2, queries, target, options.seed);
+  if (!drawn) return drawn.error();
+  if (result.stopped_by == "target" && !drawn.value().by_budget && drawn.value().depth_in_aims > 1) {
+    Asset quick = with_quick_fits(asset, pieces);
+    auto redrawn = draw_maps(quick, areas_m2, queries, target, options.seed);
+    if (!redrawn) return redrawn.error();
+    if (redrawn.value().depth_in_aims < drawn.value().depth_in_aims) {
+      asset.parts = std::move(quick.parts);
+      asset.sphere = quick.sphere;
+      drawn = redrawn;
+      for (std::size_t k = 0; k < pieces.size(); ++k) result.fits[k] = pieces[k].quick->fit;
+    }
+  }
+  if (drawn.value().by_budget) result.stopped_by = "bytes";
   asset.mesh = prepared.record;
   asset.provenance = provenance(source, asked);
   if (progress.stop()) return cancelled();

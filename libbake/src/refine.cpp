@@ -38,7 +38,7 @@ Result<Piece> draft_piece(const SolidSet& set, Cell cell, const MeshQueries& que
   options.quick = true;
   auto fitted = fit_part(set, cell, options);
   if (!fitted) return fitted.error();
-  Piece piece{std::move(cell), std::move(fitted.value().part), fitted.value().fit, {}, 0, {}};
+  Piece piece{std::move(cell), std::move(fitted.value().part), fitted.value().fit, {}, {}, 0, {}};
   draft_map(piece.part, queries, kDraftQuadrantCells);
   return piece;
 }
@@ -49,6 +49,8 @@ Outcome fit_pieces(const SolidSet& set, std::vector<Piece>& pieces, const FitOpt
   tbb::parallel_for(std::size_t{0}, pieces.size(), [&](std::size_t k) {
     auto fitted = fit_part(set, pieces[k].cell, options);
     if (fitted) {
+      pieces[k].quick = FittedPart{std::move(pieces[k].part), pieces[k].fit};
+      pieces[k].quick->part.map = {};
       pieces[k].part = std::move(fitted.value().part);
       pieces[k].fit = fitted.value().fit;
     } else {

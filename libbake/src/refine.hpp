@@ -7,8 +7,7 @@
 
 #include "sqmap/bake/bake.hpp"
 
-#include "map_builder.hpp"
-#include "partition.hpp"
+#include "part_builder.hpp"
 
 namespace sqmap::bake {
 
@@ -23,6 +22,7 @@ struct Piece {
   Cell cell;
   Part part;
   PartFit fit;
+  std::optional<FittedPart> quick;  ///< what the partition was judged by, once `part` is the full fit
   std::optional<std::vector<HalfSpace>> cuts;  ///< planes to split it by, best first
   std::size_t cuts_tried{};                    ///< of them, those that did not pay
   std::optional<Spare> spare;                  ///< of those, the one that cost least
