@@ -4,8 +4,8 @@
 #   sqmap_bake(TARGET name MESHES mesh... [OUTPUT_DIR dir] [OPTIONS option...] [PROJECT file] [BUNDLES variable])
 #
 # Bakes each mesh to a bundle when `name` or something that depends on it is built. A mesh is baked again when it, a
-# file it refers to, its sidecar, the project file, one of the options or sqbake itself has changed; a bundle whose
-# contents stay the same is left untouched.
+# file it refers to, its sidecar, the project file, one of the options or sqbake itself has changed, and when a sidecar
+# or a nearer project file appears; a bundle whose contents stay the same is left untouched.
 #
 #   TARGET      target to make; part of `all`
 #   MESHES      mesh files, relative to the current source folder; no two may have the same name
@@ -37,6 +37,20 @@ function(sqmap_bake)
     list(APPEND options --config ${arg_PROJECT})
   endif()
 
+  # A depfile names what was read, not what appears later: a sidecar, or a project file in the folder of a mesh or above.
+  set(patterns)
+  foreach(mesh ${arg_MESHES})
+    cmake_path(ABSOLUTE_PATH mesh BASE_DIRECTORY ${CMAKE_CURRENT_SOURCE_DIR} NORMALIZE)
+    cmake_path(GET mesh PARENT_PATH folder)
+    list(APPEND patterns ${folder}/*.sqbake.toml)
+    while(NOT arg_PROJECT AND NOT ${folder}/sqbake.toml IN_LIST patterns)
+      list(APPEND patterns ${folder}/sqbake.toml)
+      cmake_path(GET folder PARENT_PATH folder)
+    endwhile()
+  endforeach()
+  list(REMOVE_DUPLICATES patterns)
+  file(GLOB settings_files CONFIGURE_DEPENDS ${patterns})
+
   set(bundles)
   foreach(mesh ${arg_MESHES})
     if(NOT mesh MATCHES "\\.[A-Za-z0-9]+$")
@@ -52,8 +66,22 @@ function(sqmap_bake)
                           "with another OUTPUT_DIR")
     endif()
     list(APPEND bundles ${bundle})
-    # A depfile names what was read, not what appears later.
-    file(GLOB sidecars CONFIGURE_DEPENDS ${mesh}.sqbake.toml ${stem}.sqbake.toml)
+    set(settings)
+    foreach(file ${mesh}.sqbake.toml ${stem}.sqbake.toml)
+      if(file IN_LIST settings_files)
+        list(APPEND settings ${file})
+      endif()
+    endforeach()
+    set(folder ${mesh})
+    cmake_path(GET folder PARENT_PATH above)
+    while(NOT above STREQUAL folder)
+      set(folder ${above})
+      if(${folder}/sqbake.toml IN_LIST settings_files)
+        list(APPEND settings ${folder}/sqbake.toml)
+        break()
+      endif()
+      cmake_path(GET folder PARENT_PATH above)
+    endwhile()
     # Only Ninja looks whether an output has changed; the others go by its time.
     set(finish)
     if(NOT CMAKE_GENERATOR MATCHES Ninja)
@@ -62,7 +90,7 @@ function(sqmap_bake)
     add_custom_command(
       OUTPUT ${bundle}
       COMMAND sqmap::sqbake bake ${mesh} --output ${bundle} --depfile ${bundle}.d --quiet ${options} ${finish}
-      DEPENDS ${mesh} ${sidecars} ${arg_PROJECT} sqmap::sqbake
+      DEPENDS ${mesh} ${settings} ${arg_PROJECT} sqmap::sqbake
       DEPFILE ${bundle}.d
       COMMENT "Baking ${name}.h5" VERBATIM COMMAND_EXPAND_LISTS)
   endforeach()

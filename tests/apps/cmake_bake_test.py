@@ -97,6 +97,23 @@ class BakedProject(FolderTest):
             self.assertEqual(self.bake_what_changed(), FURNITURE)
             self.assertEqual(self.bake_what_changed(), set())
 
+        with self.subTest("a project file appeared above the meshes, another beside them, changed, and they went"):
+            above, beside = self.source / "sqbake.toml", self.source / "meshes" / "sqbake.toml"
+            above.write_text("[default]\nmax-parts = 5\n", encoding="ascii")
+            self.assertEqual(self.bake_what_changed(), TOYS | FURNITURE)
+            beside.write_text("[default]\nmax-parts = 6\n", encoding="ascii")
+            self.assertEqual(self.bake_what_changed(), TOYS | FURNITURE)
+            self.assertEqual(self.bake_what_changed(), set())
+            above.write_text("[default]\nmax-parts = 7\n", encoding="ascii")
+            self.assertEqual(self.bake_what_changed(), set(), "the nearest one holds")
+            beside.write_text("[default]\nmax-parts = 8\n", encoding="ascii")
+            self.assertEqual(self.bake_what_changed(), TOYS | FURNITURE)
+            beside.unlink()
+            self.assertEqual(self.bake_what_changed(), TOYS | FURNITURE)
+            above.unlink()
+            self.assertEqual(self.bake_what_changed(), TOYS | FURNITURE)
+            self.assertEqual(self.bake_what_changed(), set())
+
         with self.subTest("another sqbake"):
             (self.prefix / "bin" / "sqbake").touch()
             self.assertEqual(self.bake_what_changed(), TOYS | FURNITURE)
