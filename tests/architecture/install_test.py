@@ -69,6 +69,19 @@ def names_folder(prefix, folders):
                 yield from (f"{name} names {match[0]}" for match in found if match)
 
 
+def check_documents(prefix):
+    """Each program's man page and completion scripts lie where man and the shells look, as the program writes them."""
+    for program in ("sqbake", "sqinfo", "sqbench"):
+        for kind, name in (("man", f"man/man1/{program}.1"), ("bash", f"bash-completion/completions/{program}"),
+                           ("zsh", f"zsh/site-functions/_{program}"), ("fish", f"fish/vendor_completions.d/{program}.fish")):
+            with open(os.path.join(prefix, "share", name), encoding="utf-8") as file:
+                written = subprocess.run([os.path.join(prefix, "bin", program), "--generate", kind], capture_output=True,
+                                         text=True, check=True).stdout
+                assert file.read() == written and program in written, name
+    bash = 'source "$0"; complete -p sqbake'
+    assert "-F _sqbake" in run("bash", "-c", bash, os.path.join(prefix, "share/bash-completion/completions/sqbake"))
+
+
 def main(build_dir, source_dir, compiler, bundle=None):
     with tempfile.TemporaryDirectory() as work:
         first, second = os.path.join(work, "first"), os.path.join(work, "moved", "away")
@@ -78,6 +91,7 @@ def main(build_dir, source_dir, compiler, bundle=None):
         if bundle:
             for program in ("sqbake", "sqinfo"):
                 run(os.path.join(first, "bin", program), "--version")
+            check_documents(first)
         check_prefix(first, os.path.join(work, "a"), compiler, bundle)
         if bundle:
             text = configure(first, os.path.join(work, "no_c"), SAMPLE, compiler, "runtime;io", expected=1)
