@@ -31,7 +31,8 @@ struct WorkItem {
   std::uint64_t bytes{};  ///< of the input
 };
 
-/// Expected cost of a bake, in any unit: a fixed part, and one that grows with the mesh.
+/// Expected cost of a bake, in any unit: a fixed part, and one that grows with the mesh. A guess; see
+/// kFixedCost.
 std::uint64_t estimated_cost(std::uint64_t input_bytes);
 
 /// The shard of each item: the costliest first, each to the shard that has least so far (no shard then
