@@ -121,6 +121,15 @@ class Shards(FolderTest):
             self.assertEqual(answer[0], code, answer)
             self.assertEqual("two runs made different bundles" in answer[1], name == "other")
 
+    def test_a_merge_names_what_failed_and_counts_what_was_stopped(self):
+        (self.models / "a.off").write_text("OFF\n", encoding="ascii")
+        run_ = run("sqbake", "bake", self.models, "--recursive", "--out-dir", self.folder / "out", "--format", "ndjson",
+                   "--fail-fast", "-j1")
+        (self.folder / "records").write_text(run_.stdout, encoding="utf-8")
+        code, messages, _ = self.merge("records")
+        self.assertEqual((code, len(messages.splitlines())), (1, 3), messages)
+        self.assertRegex(messages, r"a\.off: failed: .*\n.*m1\.off: cancelled: .*\n.* 4 more were cancelled")
+
     def test_a_plan_finds_what_a_bake_with_the_same_options_would_refuse(self):
         plan = ("plan", self.models, "--recursive", "--out-dir", self.folder / "out")
         self.assert_exit(run("sqbake", *plan, "--quality", "fine", "--timeout", "5m"), 0)

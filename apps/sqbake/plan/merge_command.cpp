@@ -120,9 +120,15 @@ Exit run_merge(Console& console, const MergeArguments& arguments) {
     console.error(output + ": two runs made different bundles; bake it again, with one version of sqbake");
   for (const std::string& output : merged.unplanned)
     console.warning(output + ": has a record, but is not in the plan");
-  for (const AssetRecord& record : merged.records)
-    if (!record.has_bundle())
-      console.error(fmt::format("{}: {}: {}", record.input, record.outcome, record.finding));
+  std::size_t cancelled_count = 0;
+  for (const AssetRecord& record : merged.records) {
+    if (record.has_bundle()) continue;
+    // A run that is stopped early leaves thousands of these, and they would hide what failed.
+    if (record.outcome == "cancelled" && cancelled_count++ > 0) continue;
+    console.error(fmt::format("{}: {}: {}", record.input, record.outcome, record.finding));
+  }
+  if (cancelled_count > 1)
+    console.error(fmt::format("{} more were cancelled; run their shards again", cancelled_count - 1));
 
   const std::string text = merged_text(merged, unfinished);
   if (arguments.output.empty() || arguments.output == "-") {
