@@ -170,7 +170,8 @@ Result<std::vector<fs::path>> expand_glob(std::string_view pattern) {
   const std::string_view rest =
       root.empty() ? pattern : pattern.substr(root.native().size() + (root == "/" ? 0 : 1));
   if (const std::string fault = glob_fault(rest); !fault.empty())
-    return Error{Status::kBadOption, fmt::format("{}: {}", pattern, fault), "check the pattern"};
+    return Error{Status::kFileMissing, fmt::format("{}: no such file, and no pattern: {}", pattern, fault),
+                 "check the path"};
   const bool is_deep = rest.find('/') != std::string_view::npos || rest == "**";
   Result<std::vector<fs::path>> files = files_below(root.empty() ? fs::path(".") : root, is_deep);
   if (!files) return files;

@@ -31,7 +31,7 @@ std::filesystem::path glob_root(std::string_view pattern);
 /// folder that cannot be entered.
 Result<std::vector<std::filesystem::path>> files_below(const std::filesystem::path& folder, bool recursive);
 
-/// The files that match, sorted. Errors: kBadOption (glob_fault), kFileMissing (glob_root is no folder),
+/// The files that match, sorted. Errors: kFileMissing (glob_fault, or glob_root is no folder),
 /// kFileUnreadable.
 Result<std::vector<std::filesystem::path>> expand_glob(std::string_view pattern);
 

@@ -50,8 +50,8 @@ class Inputs(FolderTest):
         self.refuse(3, "nowhere", f"{self.models}/nowhere/*.off")
 
     def test_a_broken_pattern_is_refused(self):
-        self.refuse(2, "without `]`", f"{self.models}/[ab.off")
-        self.refuse(2, "whole name", f"{self.models}/**.off")
+        self.refuse(3, ["no such file", "without `]`"], f"{self.models}/[ab.off")
+        self.refuse(3, "whole name", f"{self.models}/**.off")
         write_off(self.models / "[ab.off", box())
         self.assertEqual(self.pairs(self.models / "[ab.off"), [("[ab.off", "[ab.h5")])
         self.assertEqual(self.pairs(f"{self.models}/[[]*.off"), [("[ab.off", "[ab.h5")])
