@@ -25,7 +25,7 @@ namespace sqmap::runtime {
 /// Bias: where the proxy is not the nearest surface, the depth is larger than the distance; beyond `lose_m`
 /// it makes for the nearest surface after all. A contact's first and last frame are not bounded. Sources:
 /// Zilles and Salisbury 1995 (god-object); Ruspini et al. 1997, [26] of the paper (proxy); neither bounds the
-/// step. No query for most contacts, up to three for the rest. Memory: 40 bytes a point of B.
+/// step. No query for most contacts, up to three for the rest, together. Memory: 40 bytes a point of B.
 class Tracking {
  public:
   static constexpr const char* kName = "tracking";
@@ -43,7 +43,12 @@ class Tracking {
     Vec3f place_m, normal, point_m;
     std::uint32_t frame{};
   };
-  void follow(const Field& field, const Contact& contact, Proxy& proxy) const noexcept;
+  void touch_some(const Field& field, std::span<Contact> contacts) noexcept;
+  /// Whether the proxy is lost, as it becomes where it is much deeper than the contact.
+  bool lose_far(const Contact& contact, Proxy& proxy) const noexcept;
+  /// Moves the proxy towards its target.
+  void follow(const Contact& contact, const Vec3f& target_m, const Vec3f& target_normal,
+              Proxy& proxy) const noexcept;
 
   std::vector<Proxy> proxies_;  ///< one a point of B
   std::uint32_t frame_ = 1;
