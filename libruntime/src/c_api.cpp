@@ -169,6 +169,38 @@ sqmap_status build(const sqmap_asset_desc& desc, sqmap_object** object, sqmap_er
   return c_object(asset, object, error);
 }
 
+/// What both kinds of contacts of a body check and convert; `ask` has the question itself.
+template <class Ask>
+sqmap_status contacts_of(const sqmap_body* body, const sqmap_body_placement* placement,
+                         const sqmap_body_options* options, sqmap_work_budget* budget,
+                         std::span<sqmap_contact> contacts, std::size_t* found, const Ask& ask) {
+  if (body == nullptr || placement == nullptr || found == nullptr ||
+      (contacts.data() == nullptr && !contacts.empty()))
+    return SQMAP_NULL_ARGUMENT;
+  if (!is_known(options) || !is_known(budget)) return SQMAP_STRUCT_SIZE;
+  ContactQuery query;
+  if (options != nullptr) {
+    if (options->layer > SQMAP_LAYER_3 || options->seek > SQMAP_SEEK_DEEPEST || !(options->within_m >= 0))
+      return SQMAP_BAD_OPTION;
+    query = {query_options(options->layer, options->level, options->edge_length_m), options->within_m,
+             static_cast<Seek>(options->seek)};
+  }
+  if (!(placement->scale > 0)) return SQMAP_BAD_OPTION;
+  const double* q = placement->orientation_wxyz;
+  const Pose pose{{q[0], q[1], q[2], q[3]}, vector(placement->translation_m)};
+  const std::span<Contact> room(reinterpret_cast<Contact*>(contacts.data()), contacts.size());
+  if (budget == nullptr) {
+    *found = ask(pose, query, room, nullptr);
+    return SQMAP_OK;
+  }
+  WorkBudget work{budget->units};
+  *found = ask(pose, query, room, &work);
+  budget->spent = work.spent;
+  budget->layer = static_cast<std::uint32_t>(work.layer);
+  budget->level = work.level;
+  return SQMAP_OK;
+}
+
 }  // namespace
 
 sqmap_status c_failure(int status, const char* finding, const char* remedy, sqmap_error* error) noexcept {
@@ -376,31 +408,30 @@ sqmap_status sqmap_body_contacts(const sqmap_object* object, const sqmap_body* b
                                  const sqmap_body_placement* placement, const sqmap_body_options* options,
                                  sqmap_work_budget* budget, sqmap_contact* contacts, std::size_t capacity,
                                  std::size_t* found) {
-  if (object == nullptr || body == nullptr || placement == nullptr || found == nullptr ||
-      (contacts == nullptr && capacity > 0))
-    return SQMAP_NULL_ARGUMENT;
-  if (!is_known(options) || !is_known(budget)) return SQMAP_STRUCT_SIZE;
-  ContactQuery query;
-  if (options != nullptr) {
-    if (options->layer > SQMAP_LAYER_3 || options->seek > SQMAP_SEEK_DEEPEST || !(options->within_m >= 0))
-      return SQMAP_BAD_OPTION;
-    query = {query_options(options->layer, options->level, options->edge_length_m), options->within_m,
-             static_cast<Seek>(options->seek)};
-  }
-  if (!(placement->scale > 0)) return SQMAP_BAD_OPTION;
-  const double* q = placement->orientation_wxyz;
-  const BodyPlacement placed{{{q[0], q[1], q[2], q[3]}, vector(placement->translation_m)}, placement->scale};
-  const std::span<Contact> room(reinterpret_cast<Contact*>(contacts), capacity);
-  if (budget == nullptr) {
-    *found = object->object.contacts(body->body, placed, room, query);
-    return SQMAP_OK;
-  }
-  WorkBudget work{budget->units};
-  *found = object->object.contacts(body->body, placed, room, query, work);
-  budget->spent = work.spent;
-  budget->layer = static_cast<std::uint32_t>(work.layer);
-  budget->level = work.level;
-  return SQMAP_OK;
+  if (object == nullptr) return SQMAP_NULL_ARGUMENT;
+  return contacts_of(
+      body, placement, options, budget, {contacts, capacity}, found,
+      [&](const sqmap::Pose& pose, const ContactQuery& query, std::span<Contact> room, WorkBudget* work) {
+        const BodyPlacement placed{pose, placement->scale};
+        return work != nullptr ? object->object.contacts(body->body, placed, room, query, *work)
+                               : object->object.contacts(body->body, placed, room, query);
+      });
+}
+
+sqmap_status sqmap_instance_body_contacts(const sqmap_instance* instance, const sqmap_body* body,
+                                          const sqmap_body_placement* world_from_body,
+                                          std::int32_t is_mirrored, const sqmap_body_options* options,
+                                          sqmap_work_budget* budget, sqmap_contact* contacts,
+                                          std::size_t capacity, std::size_t* found) {
+  if (const sqmap_status status = check(instance, nullptr, 0, nullptr); status != SQMAP_OK) return status;
+  const Instance placed = unpacked(*instance).instance();
+  return contacts_of(
+      body, world_from_body, options, budget, {contacts, capacity}, found,
+      [&](const sqmap::Pose& pose, const ContactQuery& query, std::span<Contact> room, WorkBudget* work) {
+        const Placement at{pose, world_from_body->scale, is_mirrored != 0};
+        return work != nullptr ? placed.contacts(body->body, at, room, query, *work)
+                               : placed.contacts(body->body, at, room, query);
+      });
 }
 
 std::uint64_t sqmap_work_units(double units_per_us, double us) {

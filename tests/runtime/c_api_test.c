@@ -292,6 +292,37 @@ static void meets_a_body(const sqmap_object* object) {
   SQMAP_CHECK(strstr(error.finding, "point 0") != NULL);
 }
 
+// The ball of 0.4 m, twice as large, is 0.8 m about (10, 0, 0): a point at x = 10.7 is 0.1 m deep. Mirrored,
+// the body has its points at the other side of its origin.
+static void meets_bodies_in_the_world(const sqmap_instance* instance) {
+  const float points[6] = {0.35F, 0, 0, 5, 5, 5};
+  sqmap_body* body = NULL;
+  SQMAP_CHECK(sqmap_body_build(points, 2, &body, NULL) == SQMAP_OK);
+  if (body == NULL) return;
+  sqmap_contact contacts[2];
+  size_t found = 9;
+  sqmap_work_budget budget = SQMAP_WORK_BUDGET_INIT;
+  budget.units = 1000;
+  for (int32_t is_mirrored = 0; is_mirrored < 2; ++is_mirrored) {
+    const sqmap_body_placement at = {{1, 0, 0, 0}, {is_mirrored ? 11.4 : 10, 0, 0}, 2};
+    SQMAP_CHECK(sqmap_instance_body_contacts(instance, body, &at, is_mirrored, NULL, &budget, contacts, 2,
+                                             &found) == SQMAP_OK);
+    SQMAP_CHECK(found == 1 && contacts[0].point == 0 && SQMAP_NEAR(contacts[0].depth_m, 0.1, 1e-3));
+    SQMAP_CHECK(SQMAP_NEAR(contacts[0].position_m[0], 10.7, 1e-5) &&
+                SQMAP_NEAR(contacts[0].normal[0], 1, 1e-3));
+    SQMAP_CHECK(budget.layer == SQMAP_LAYER_3 && budget.spent > 0);
+    SQMAP_CHECK(sqmap_instance_body_contacts(instance, body, &at, !is_mirrored, NULL, NULL, contacts, 2,
+                                             &found) == SQMAP_OK &&
+                found == (is_mirrored ? 0U : 1U));
+  }
+  const sqmap_instance never = {{0}};
+  SQMAP_CHECK(sqmap_instance_body_contacts(&never, body, NULL, 0, NULL, NULL, contacts, 2, &found) ==
+              SQMAP_NULL_ARGUMENT);
+  SQMAP_CHECK(sqmap_instance_body_contacts(instance, body, NULL, 0, NULL, NULL, contacts, 2, &found) ==
+              SQMAP_NULL_ARGUMENT);
+  sqmap_body_destroy(body);
+}
+
 static void keeps_a_rate(void) {
   SQMAP_CHECK(sqmap_work_units(20, 100) == 2000 && sqmap_work_units(20, NAN) == 0);
   const double slower = sqmap_work_learned(20, 1000, 100), faster = sqmap_work_learned(20, 10000, 100);
@@ -303,6 +334,7 @@ static void all_about(sqmap_object* object) {
   tells_about_the_object(object);
   places_and_refuses(object);
   const sqmap_instance instance = placed(object);
+  meets_bodies_in_the_world(&instance);
   answers_points(&instance);
   finds_contacts(&instance);
   tells_what_is_sure(object, &instance);

@@ -258,6 +258,13 @@ SQMAP_API sqmap_status sqmap_body_contacts(const sqmap_object* object, const sqm
                                            const sqmap_body_placement* placement,
                                            const sqmap_body_options* options, sqmap_work_budget* budget,
                                            sqmap_contact* contacts, size_t capacity, size_t* found);
+// The same of an instance, contacts in the world. p_world = scale * R * F * p_body + t, F = diag(-1, 1, 1)
+// where the body is mirrored.
+SQMAP_API sqmap_status sqmap_instance_body_contacts(const sqmap_instance* instance, const sqmap_body* body,
+                                                    const sqmap_body_placement* world_from_body,
+                                                    int32_t is_mirrored, const sqmap_body_options* options,
+                                                    sqmap_work_budget* budget, sqmap_contact* contacts,
+                                                    size_t capacity, size_t* found);
 
 // Turns microseconds into units, by what frames before took; the caller holds the clock and the rate.
 #define SQMAP_UNITS_PER_US 20.0  // until frames have been seen
