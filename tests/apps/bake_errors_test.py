@@ -80,7 +80,7 @@ class BadInput(FolderTest):
 
     def test_a_file_name_cannot_forge_a_line_of_the_log(self):
         result = run("sqbake", "bake", self.folder / "a\nsqbake: error: b\033[2J.off", "-o", self.folder / "out.h5")
-        self.assert_exit(result, 2)  # a pattern that is none
+        self.assert_exit(result, 3)
         self.assertEqual(result.stderr.count("\n"), 1)
         self.assertNotIn("\033", result.stderr)
 
