@@ -12,9 +12,10 @@
 namespace sqmap::bench {
 namespace {
 
-constexpr std::array<const char*, 16> kColours{
-    "#c0392b", "#e67e22", "#2471a3", "#17a589", "#7d3c98", "#566573", "#b7950b", "#229954",
-    "#000000", "#ff5ca8", "#5dade2", "#784212", "#9acd32", "#4a235a", "#f1948a", "#0b5345"};
+constexpr std::array<const char*, 20> kColours{"#c0392b", "#e67e22", "#2471a3", "#17a589", "#7d3c98",
+                                               "#566573", "#b7950b", "#229954", "#000000", "#ff5ca8",
+                                               "#5dade2", "#784212", "#9acd32", "#4a235a", "#f1948a",
+                                               "#0b5345", "#f4d03f", "#aab7b8", "#1b4f72", "#a569bd"};
 constexpr double kWidth = 860;
 constexpr std::size_t kMostDots = 40;  ///< of a line; more would hide it
 
@@ -41,7 +42,8 @@ struct Axis {
 };
 
 Axis axis_over(double least, double most, double begin, double length) {
-  const double low = std::floor(std::log10(least) - 1e-9), high = std::ceil(std::log10(most) + 1e-9);
+  // A value on a power of ten lies on the rim, for all the rounding of its logarithm.
+  const double low = std::floor(std::log10(least) + 1e-9), high = std::ceil(std::log10(most) - 1e-9);
   return {low, std::max(high, low + 1), begin, length};
 }
 
@@ -57,8 +59,16 @@ Axis linear_axis(double least, double most, double begin, double length) {
 }
 
 std::string power_of_ten(int exponent) {
-  return exponent >= -4 && exponent <= 4 ? fmt::format("{:g}", std::pow(10.0, exponent))
+  return exponent >= -4 && exponent <= 5 ? fmt::format("{:g}", std::pow(10.0, exponent))
                                          : fmt::format("1e{}", exponent);
+}
+
+/// Three digits, without an exponent.
+std::string plain(double value) {
+  if (!(value > 0)) return fmt::format("{:g}", value);
+  const int digits = 2 - static_cast<int>(std::floor(std::log10(value)));
+  const double unit = std::pow(10.0, digits);
+  return fmt::format("{:.{}f}", std::round(value * unit) / unit, std::max(digits, 0));
 }
 
 struct Tick {
@@ -81,10 +91,25 @@ std::vector<Tick> ticks_of(const Axis& axis) {
   return ticks;
 }
 
+/// Places of 2 to 9 times the powers of ten.
+std::vector<double> between_decades(const Axis& axis) {
+  std::vector<double> places;
+  if (axis.step > 0) return places;
+  for (int e = static_cast<int>(axis.low); e < static_cast<int>(axis.high); ++e)
+    for (int k = 2; k < 10; ++k) places.push_back(axis.place(e + std::log10(k)));
+  return places;
+}
+
 /// Grid lines, their numbers and the titles of both axes.
 std::string frame_of(const Axis& x, const Axis& y, const std::string& x_title, const std::string& y_title) {
   const double left = x.begin, right = x.begin + x.length, bottom = y.begin, top = y.begin + y.length;
   std::string svg;
+  for (const double at : between_decades(x))
+    svg += fmt::format("<line x1=\"{0:.1f}\" x2=\"{0:.1f}\" y1=\"{1}\" y2=\"{2}\" stroke=\"#f3f3f3\"/>\n", at,
+                       top, bottom);
+  for (const double at : between_decades(y))
+    svg += fmt::format("<line x1=\"{1}\" x2=\"{2}\" y1=\"{0:.1f}\" y2=\"{0:.1f}\" stroke=\"#f3f3f3\"/>\n", at,
+                       left, right);
   for (const auto& [at, words] : ticks_of(x)) {
     svg += fmt::format("<line x1=\"{0:.1f}\" x2=\"{0:.1f}\" y1=\"{1}\" y2=\"{2}\" stroke=\"#ddd\"/>\n", at,
                        top, bottom);
@@ -100,9 +125,7 @@ std::string frame_of(const Axis& x, const Axis& y, const std::string& x_title, c
                     fmt::format("transform=\"rotate(-90 20 {})\"", (top + bottom) / 2).c_str());
 }
 
-double disc_radius(double bytes) {
-  return 2 + 1.5 * std::max(0.0, std::log2(std::max(bytes, 1024.0) / 1024));
-}
+double disc_radius(double bytes) { return 2 + 0.8 * std::log2(std::max(bytes, 1024.0) / 1024); }
 
 }  // namespace
 
@@ -119,7 +142,8 @@ std::string escaped(const std::string& words) {
 
 std::string scatter_svg(const std::string& title, const std::string& x_title, const std::string& y_title,
                         const std::vector<Series>& series) {
-  constexpr double kHeight = 560, kLeft = 80, kRight = 610, kTop = 44, kBottom = 500;
+  constexpr double kLeft = 80, kRight = 610, kTop = 44, kBottom = 500;
+  const double height = std::max(560.0, kTop + 20.0 * static_cast<double>(series.size()) + 140);
   double x_low = std::numeric_limits<double>::infinity(), x_high = 0, y_low = x_low, y_high = 0;
   for (const Series& one : series)
     for (const Disc& disc : one.discs) {
@@ -128,7 +152,7 @@ std::string scatter_svg(const std::string& title, const std::string& x_title, co
       y_low = std::min(y_low, disc.y);
       y_high = std::max(y_high, disc.y);
     }
-  std::string svg = opening(kHeight, title);
+  std::string svg = opening(height, title);
   if (!(x_low > 0) || !(y_low > 0) || !std::isfinite(x_low))
     return svg + text(kLeft, 60, "start", "no values") + "</svg>\n";
   const Axis x = axis_over(x_low, x_high, kLeft, kRight - kLeft),
@@ -239,7 +263,7 @@ std::string bars_svg(const std::string& title, const std::string& x_title, const
                        y + 4, std::max(1.0, x.at(bar.value) - kLeft), bar.is_ours ? "#c0392b" : "#7fb3d5");
     svg += fmt::format("<line x1=\"{:.1f}\" x2=\"{:.1f}\" y1=\"{:.1f}\" y2=\"{:.1f}\" stroke=\"black\"/>\n",
                        x.at(bar.lower), x.at(bar.upper), y + 11, y + 11);
-    svg += text(x.at(bar.upper) + 6, y + 15, "start", fmt::format("{:.3g}", bar.value));
+    svg += text(x.at(bar.upper) + 6, y + 15, "start", plain(bar.value));
     y += kRow;
   }
   return svg + "</svg>\n";
