@@ -8,6 +8,7 @@
 #include <system_error>
 #include <utility>
 
+#include <assimp/BaseImporter.h>
 #include <assimp/DefaultIOSystem.h>
 #include <assimp/Importer.hpp>
 #include <assimp/scene.h>
@@ -122,6 +123,11 @@ Result<PolygonMesh> read_scene(const fs::path& path) {
       "check that the file opens in another program, or convert it to OFF, PLY or GLB";
   try {
     Assimp::Importer importer;
+    // assimp goes by content, too, and never ends on some broken PLY headers; .ply has a reader of its own.
+    if (Assimp::BaseImporter* ply = importer.GetImporter("ply"); ply != nullptr) {
+      importer.UnregisterLoader(ply);
+      delete ply;  // NOLINT(cppcoreguidelines-owning-memory): unregistering hands it back
+    }
     importer.SetIOHandler(new FolderIo(path));                                     // the importer owns it
     importer.SetPropertyBool(AI_CONFIG_IMPORT_COLLADA_IGNORE_UP_DIRECTION, true);  // ReadOptions::up decides
     // No post-processing: it would triangulate and so lose the numbers of the polygons.

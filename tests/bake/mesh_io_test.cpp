@@ -346,6 +346,15 @@ TEST_F(MeshIo, ErrorsNameWhatWasFound) {
   for (const Case& c : ply_cases) expect_error(write("bad.ply", c.text), Status::kInvalidMesh, c.finding);
 }
 
+// assimp reads what the content says, and never ends on some PLY headers: its PLY reader is not asked.
+TEST_F(MeshIo, PlyUnderAnotherNameIsNotReadByAssimp) {
+  const std::string ply =
+      "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
+      "element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";
+  EXPECT_TRUE(read_mesh(write("good.ply", ply)).ok());
+  expect_error(write("good.glb", ply), Status::kInvalidMesh, "No suitable reader");
+}
+
 TEST_F(MeshIo, CutFilesAreRefusedNotHalfRead) {
   const std::string stl = binary_stl(test::sphere(1, 1));
   expect_error(write("cut.stl", stl.substr(0, stl.size() / 2)), Status::kInvalidMesh, "cut.stl");
