@@ -88,13 +88,20 @@ class SlurmTest(FolderTest):
 
     def wait_for_bake(self, task):
         """Until a task has baked a mesh and is baking another; the number of its process, records so far."""
-        line = f"SLURM_ARRAY_TASK_ID={task}"
+        return wait_until(lambda: self.midway(task), f"task {task} midway", JOB_TIMEOUT_S)
 
-        def midway():
-            bakes, workers = (processes("sqbake", name, environment=line) for name in ("bake", "worker"))
-            done = records_in(self.records / f"shard-{task}.ndjson")
-            return bakes and workers and done and (bakes[0], done)
-        return wait_until(midway, f"task {task} midway", JOB_TIMEOUT_S)
+    def midway(self, task):
+        line = f"SLURM_ARRAY_TASK_ID={task}"
+        bakes, workers = (processes("sqbake", name, environment=line) for name in ("bake", "worker"))
+        done = records_in(self.records / f"shard-{task}.ndjson")
+        return bakes and workers and done and (bakes[0], done)
+
+    def wait_for_bake_on(self, node):
+        """The number of a task that is midway on this node: which one runs there is Slurm's choice."""
+        def one():
+            return next((number for number, task in self.cluster.tasks().items() if task["JobState"] == "RUNNING"
+                         and task["NodeList"] == node and self.midway(number)), None)
+        return wait_until(one, f"a task midway on {node}", JOB_TIMEOUT_S)
 
     def test_gives_what_one_machine_gives(self):
         job = self.submit()
@@ -150,10 +157,7 @@ class SlurmTest(FolderTest):
     def test_the_task_of_a_node_that_crashes_is_baked_by_another(self):
         self.addCleanup(self.cluster.heal, "node2")
         job = self.submit()
-        self.wait_for_bake(2)
-        running = {number: task["NodeList"] for number, task in self.cluster.tasks().items()
-                   if task["JobState"] == "RUNNING"}
-        victim = next(number for number, node in running.items() if node == "node2")
+        victim = self.wait_for_bake_on("node2")
         self.cluster.crash_node("node2")
         self.cluster.start_now(victim)
         self.assert_whole(job)
