@@ -11,6 +11,7 @@
 #include <fcntl.h>
 #include <gtest/gtest.h>
 #include <sys/file.h>
+#include <sys/prctl.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -97,8 +98,10 @@ TEST_F(AbandonedFiles, OfALivingWriterStay) {
 TEST_F(AbandonedFiles, AreNeverThoseOfAWriteUnderWay) {
   const fs::path target = folder_ / "a.h5";
   const pid_t cleaner = ::fork();
-  if (cleaner == 0)
+  if (cleaner == 0) {
+    ::prctl(PR_SET_PDEATHSIG, SIGKILL);
     for (;;) remove_abandoned(std::vector{target});
+  }
   int failed = 0;
   for (int k = 0; k < 300; ++k) failed += write_file(target, std::to_string(k)) ? 0 : 1;
   ::kill(cleaner, SIGKILL);
