@@ -33,16 +33,18 @@ namespace {
 // Vertex samples are kept where the surface misses the vertex by this multiple of the error target.
 constexpr double kVertexTolerance = 2;
 // Shell that finished maps are judged in: points, and half width as a share of R_max.
-constexpr std::uint32_t kShellPoints = 4000;
+constexpr std::uint32_t kShellPoints = 16000;
 constexpr double kShellWidth = 0.03;
-// Maps are drawn at most so often, each time for this share of the target before, while that takes a fourth
-// off an error that exceeds its aim: the target and a tenth for depth, and fifteen times the target, as a
-// share of R_max, for the share of points on the wrong side.
-constexpr int kMapRounds = 4;
-constexpr double kStricter = 0.4;
-constexpr double kWorthFinerMaps = 0.75;
+// Maps are drawn at most so often, each time for less than before: after a near miss by the
+// root of what the worse error exceeds its aim and a little, after others by a fixed share. That goes on
+// while an error that exceeds its aim falls by a fifth of what its target did. Aims are the target and a
+// tenth for depth, and ten and a half times the target, as a share of R_max, for the share of points on the
+// wrong side.
+constexpr int kMapRounds = 5;
+constexpr double kNearMiss = 1.6, kMostStricter = 0.4, kLeastStricter = 0.97;
+constexpr double kWorthFinerMaps = 0.2;
 constexpr double kNearTarget = 1.1;
-constexpr double kWrongSides = 15;
+constexpr double kWrongSides = 10.5;
 // Parts take whole triangles. So that long ones do not tie together what should be cut, edges are halved down
 // to this share of R_max first, as far as the number of added triangles allows.
 constexpr double kLongestEdge = 1.0 / 16;
@@ -213,17 +215,18 @@ struct Drawn {
 
 /// The maps that the target asks for. What they lose beside seams, where one chart ends and the next has not
 /// begun, shows only between parts: as long as the error of the whole exceeds the target, and finer maps
-/// lower it, they are drawn for a stricter one.
+/// lower it enough, they are drawn for a stricter one.
 Result<Drawn> draw_maps(Asset& asset, const std::vector<double>& areas_m2, const MeshQueries& queries,
                         const MapTarget& target, std::uint64_t seed) {
   const ShellPoints shell = sample_shell(queries, kShellWidth * asset.r_max_m, kShellPoints, seed);
   std::vector<Part> best;
   double depth_in_aims = 0, sides_in_aims = 0;
   bool by_budget = false;
-  MapTarget stricter = target;
+  MapTarget asked = target;
+  double share = 1;  // of the target before
   MapDrawer drawer(asset.parts, areas_m2, queries);
-  for (int round = 0; round < kMapRounds; ++round, stricter.error_m *= kStricter) {
-    const bool budget_decided = drawer.draw(asset.parts, stricter);
+  for (int round = 0; round < kMapRounds; ++round) {
+    const bool budget_decided = drawer.draw(asset.parts, asked);
     tbb::parallel_for(std::size_t{0}, asset.parts.size(), [&](std::size_t k) {
       add_vertex_samples(asset.parts[k], queries, kVertexTolerance * target.error_m);
     });
@@ -232,15 +235,19 @@ Result<Drawn> draw_maps(Asset& asset, const std::vector<double>& areas_m2, const
     const ShellError error = shell_error(object.value(), shell);
     const double depth = error.depth_mean_m / (kNearTarget * target.error_m);
     const double sides = error.misclassified * asset.r_max_m / (kWrongSides * target.error_m);
-    const auto gains = [](double now, double before) {
-      return before > 1 && now <= kWorthFinerMaps * before;
+    const auto gains = [share](double now, double before) {
+      return before > 1 && now <= (1 - kWorthFinerMaps * (1 - share)) * before;
     };
     if (round > 0 && !gains(depth, depth_in_aims) && !gains(sides, sides_in_aims)) break;
     depth_in_aims = depth;
     sides_in_aims = sides;
     best = asset.parts;
     by_budget = budget_decided;
-    if (by_budget || std::max(depth, sides) <= 1) break;
+    const double worse = std::max(depth, sides);
+    if (by_budget || worse <= 1) break;
+    share =
+        std::max(kMostStricter, kLeastStricter / std::sqrt(worse));  // errors fall faster than their target
+    asked.error_m *= share;
   }
   asset.parts = std::move(best);
   return Drawn{depth_in_aims, by_budget};
