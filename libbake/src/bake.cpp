@@ -35,13 +35,12 @@ constexpr double kVertexTolerance = 2;
 // Shell that finished maps are judged in: points, and half width as a share of R_max.
 constexpr std::uint32_t kShellPoints = 16000;
 constexpr double kShellWidth = 0.03;
-// Maps are drawn at most so often, each time for less than before: after a near miss by the
-// root of what the worse error exceeds its aim and a little, after others by a fixed share. That goes on
-// while an error that exceeds its aim falls by a fifth of what its target did. Aims are the target and a
-// tenth for depth, and ten and a half times the target, as a share of R_max, for the share of points on the
-// wrong side.
+// Maps are drawn at most so often, each time for less than before: by the root of what the worse error
+// exceeds its aim, and a little. That goes on while an error that exceeds its aim falls by a fifth of what
+// its target did. Aims are the target and a tenth for depth, and ten and a half times the target, as a share
+// of R_max, for the share of points on the wrong side.
 constexpr int kMapRounds = 5;
-constexpr double kNearMiss = 1.6, kMostStricter = 0.4, kLeastStricter = 0.97;
+constexpr double kMostStricter = 0.4, kLeastStricter = 0.97;
 constexpr double kWorthFinerMaps = 0.2;
 constexpr double kNearTarget = 1.1;
 constexpr double kWrongSides = 10.5;
