@@ -74,7 +74,8 @@ struct StartTable {
   std::size_t bytes() const noexcept { return std::size_t{2} * kDepths * tile_rows * tile_cols; }
   /// Of a row or column of the coarser grid: that of the middle of its cell in the map.
   float place(std::uint32_t k) const noexcept {
-    return static_cast<float>((k << step_shift) + (1U << step_shift) / 2) + 0.5F;
+    const std::uint32_t cell = (k << step_shift) + (1U << step_shift) / 2;
+    return static_cast<float>(cell) + 0.5F;
   }
 };
 
