@@ -121,6 +121,12 @@ class Chart {
     Vec3f point, row, col;
   };
 
+  /// A column less than a turn off the map, on it.
+  float wrapped(float col) const noexcept {
+    const auto turn = static_cast<float>(part_.cols);
+    const float raised = col < 0.0F ? col + turn : col;
+    return raised < turn ? raised : raised - turn;
+  }
   Cell cell_at(float row, float col, std::uint32_t stride) const noexcept;
   Start start_at(const Vec3f& p, float row, float col, std::uint32_t stride) const noexcept;
   /// In the nearest of the eight cells of the first ring around (row, col) that has one with a patch.
@@ -240,9 +246,8 @@ inline float Chart::convex_curvature(float row, float col, std::uint32_t stride)
     Vec3f point, normal;
     bool eligible;
   };
-  const auto turn = static_cast<float>(part_.cols);
   const auto centre_at = [&](float r, float c) {
-    const Cell cell = cell_at(r, c < 0 ? c + turn : c < turn ? c : c - turn, stride);
+    const Cell cell = cell_at(r, wrapped(c), stride);
     const float half = static_cast<float>(stride) / 2;
     const float mid_row = static_cast<float>(cell.row) + half, mid_col = static_cast<float>(cell.col) + half;
     return Centre{patch_at(cell, mid_row, mid_col, stride).point,
@@ -353,7 +358,7 @@ inline Chart::Start Chart::start_at(const Vec3f& p, float row, float col,
 
 inline Chart::Start Chart::start_beside(const Vec3f& p, float row, float col,
                                         std::uint32_t stride) const noexcept {
-  const auto size = static_cast<float>(stride), turn = static_cast<float>(part_.cols);
+  const auto size = static_cast<float>(stride);
   const Cell middle = cell_at(row, col, stride);
   const float mid_row = static_cast<float>(middle.row) + size / 2,
               mid_col = static_cast<float>(middle.col) + size / 2;
@@ -364,9 +369,7 @@ inline Chart::Start Chart::start_beside(const Vec3f& p, float row, float col,
       if (k == 4) continue;  // the middle
       const int rows_up = k / 3 - 1;
       const float here_row = mid_row + static_cast<float>(rows_up) * step;
-      float here_col = mid_col + static_cast<float>(k % 3 - 1) * step;
-      here_col = here_col < 0 ? here_col + turn : here_col;
-      here_col = here_col < turn ? here_col : here_col - turn;
+      const float here_col = wrapped(mid_col + static_cast<float>(k % 3 - 1) * step);
       if (!(here_row > 0 && here_row < static_cast<float>(part_.rows - 1) && here_col >= 0)) continue;
       const Start start = start_at(p, here_row, here_col, stride);
       if (start.square < best.square) best = start;
@@ -410,16 +413,12 @@ inline void Chart::third_layer(const Vec3f& p, std::uint32_t stride, ChartAnswer
   for (int step = 0; step < kThirdLayerSteps; ++step) {
     if (std::abs(d_row) + std::abs(d_col) < kLeastCellStep) break;
     float next_row = lesser(greater(row + d_row, 0.0F), last_row);
-    float next_col = col + d_col;
-    next_col = next_col < 0.0F ? next_col + turn : next_col;
-    next_col = next_col < turn ? next_col : next_col - turn;
+    float next_col = wrapped(col + d_col);
     Cell next = cell_at(next_row, next_col, stride);
     bool stays = !next.eligible;
     if (stays) {  // half the way, where that is another cell
       const float half_row = lesser(greater(row + 0.5F * d_row, 0.0F), last_row);
-      float half_col = col + 0.5F * d_col;
-      half_col = half_col < 0.0F ? half_col + turn : half_col;
-      half_col = half_col < turn ? half_col : half_col - turn;
+      const float half_col = wrapped(col + 0.5F * d_col);
       const Cell between = cell_at(half_row, half_col, stride);
       if (between.eligible && between.texel[0] != cell.texel[0]) {
         next = between;

@@ -80,6 +80,11 @@ class Looker {
     const VI left = hn::And(hn::Min(hn::Max(to_int(col), zero), all_int(part_.cols - 1)), mask);
     return cell_of(hn::Min(low, all_int(part_.rows - 1 - stride_)), left);
   }
+  /// Chart::wrapped.
+  HWY_INLINE V wrapped(V col) const noexcept {
+    const V turn = all(turn_), raised = pick(hn::Lt(col, hn::Zero(kD)), col + turn, col);
+    return pick(hn::Lt(raised, turn), raised, raised - turn);
+  }
   HWY_INLINE V depth_of(VI code) const noexcept {
     return all(part_.depth_min) + to_float(code) * all(part_.depth_step);
   }

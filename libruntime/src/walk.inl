@@ -134,18 +134,14 @@ HWY_INLINE M Walker::advance(Walk& walk, VCell& cell, M active) const noexcept {
   const V zero = hn::Zero(kD), one = all(1.0F), least_step = all(kLeastCellStep), size = all(looker_.size());
   active = hn::AndNot(hn::Lt(hn::Abs(walk.d_row) + hn::Abs(walk.d_col), least_step), active);
   if (none(active)) return active;
-  const V turn = all(looker_.turn());
   V next_row = limited(walk.row + walk.d_row, zero, all(looker_.last_row()));
   const V moved = walk.col + walk.d_col;
-  const V raised = pick(hn::Lt(moved, zero), moved + turn, moved);
-  V next_col = pick(hn::Lt(raised, turn), raised, raised - turn);
+  V next_col = looker_.wrapped(moved);
   VCell next = looker_.cell_at(next_row, next_col);
   M stays = hn::And(active, hn::Not(looker_.read(next).eligible));
   if (!none(stays)) {  // half the way, where that is another cell
     const V half_row = limited(walk.row + all(0.5F) * walk.d_row, zero, all(looker_.last_row()));
-    const V half_moved = walk.col + all(0.5F) * walk.d_col;
-    const V half_raised = pick(hn::Lt(half_moved, zero), half_moved + turn, half_moved);
-    const V half_col = pick(hn::Lt(half_raised, turn), half_raised, half_raised - turn);
+    const V half_col = looker_.wrapped(walk.col + all(0.5F) * walk.d_col);
     VCell between = looker_.cell_at(half_row, half_col);
     const M open = looker_.read(between).eligible;
     const M leaves = as_float(hn::Or(hn::Ne(between.row, cell.row), hn::Ne(between.col, cell.col)));
@@ -251,7 +247,7 @@ HWY_NOINLINE void Walker::go_on() noexcept {
 
 /// Chart::start_beside, which moves (row, col). The lanes that found a start.
 HWY_NOINLINE M Walker::find_beside(const V3& p, M lanes, V& row, V& col) const noexcept {
-  const V half = all(looker_.size() / 2), turn = all(looker_.turn()), zero = hn::Zero(kD);
+  const V half = all(looker_.size() / 2), zero = hn::Zero(kD);
   const VCell middle = looker_.cell_at(row, col);
   const V mid_row = to_float(middle.row) + half, mid_col = to_float(middle.col) + half;
   const V infinity = all(std::numeric_limits<float>::infinity());
@@ -263,9 +259,7 @@ HWY_NOINLINE M Walker::find_beside(const V3& p, M lanes, V& row, V& col) const n
       if (k == 4) continue;  // the middle
       const int rows_up = k / 3 - 1;
       const V here_row = mid_row + all(static_cast<float>(rows_up)) * step;
-      V here_col = mid_col + all(static_cast<float>(k % 3 - 1)) * step;
-      here_col = pick(hn::Lt(here_col, zero), here_col + turn, here_col);
-      here_col = pick(hn::Lt(here_col, turn), here_col, here_col - turn);
+      const V here_col = looker_.wrapped(mid_col + all(static_cast<float>(k % 3 - 1)) * step);
       M open = hn::And(hn::Gt(here_row, zero), hn::Lt(here_row, all(looker_.last_row())));
       open = hn::And(seeking, hn::And(open, hn::Ge(here_col, zero)));
       VCell cell = looker_.cell_at(here_row, here_col);
@@ -355,6 +349,7 @@ HWY_NOINLINE void Walker::end(const Walk& walk, VI entry, M lanes) noexcept {
     const M held = hn::And(lanes, looker_.block_holds(part_.fans, cell.texel[0]));
     if (!none(held)) lanes = hn::AndNot(set_aside(walk, cell, entry, held), lanes);
   }
+  const V distance = hn::Sqrt(walk.square);
   V3 normal{hn::Zero(kD), hn::Zero(kD), hn::Zero(kD)};
   if (wants_.normal) {
     normal = normalized3(walk.normal);
@@ -367,12 +362,11 @@ HWY_NOINLINE void Walker::end(const Walk& walk, VI entry, M lanes) noexcept {
     const VI flags = hn::GatherIndex(kDI, entries_.flags, pick(lanes, entry, hn::Set(kDI, kNobody)));
     const M inside = as_float(hn::Ne(hn::And(flags, all_int(kInside)), hn::Zero(kDI)));
     const V3 out = pick(inside, walk.point - walk.p, walk.p - walk.point);
-    const V distance = hn::Sqrt(walk.square);
     M turned = hn::Lt(dot3(out, normal), all(kBack) * distance);
     turned = hn::And(turned, hn::Gt(distance, all(kNearShare * Chart::far_from(part_, looker_.stride()))));
     if (!none(hn::And(turned, lanes))) normal = pick(turned, normalized3(out), normal);
   }
-  write(entry, lanes, walk.row, walk.col, walk.on_rim, hn::Sqrt(walk.square), walk.point, normal);
+  write(entry, lanes, walk.row, walk.col, walk.on_rim, distance, walk.point, normal);
 }
 
 HWY_INLINE void Walker::write(VI entry, M lanes, V row, V col, V on_rim, V distance, const V3& surface,
