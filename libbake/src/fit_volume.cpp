@@ -26,41 +26,47 @@ class InflatedVolume {
   double value(const Vector& x) {
     const LogBetaModel model(x, part_axes_);
     for (std::size_t i = 0; i < points_.size(); ++i) log_betas_[i] = model.value(points_[i]);
-    return log_volume(x) + 3 * log_p_norm();
+    log_norm_ = log_p_norm();
+    return log_volume(x) + 3 * log_norm_;
   }
 
-  Objective with_derivatives(const Vector& x) {
+  /// At the x that value() was last asked for.
+  Objective with_derivatives(const Vector& x) const {
     const LogBetaModel model(x, part_axes_);
-    for (std::size_t i = 0; i < points_.size(); ++i) log_betas_[i] = model.value(points_[i]);
-    const double log_norm = log_p_norm();
     Vector mean = Vector::Zero();
     Matrix square = Matrix::Zero();
     for (std::size_t i = 0; i < points_.size(); ++i) {
-      const double weight = std::exp(p_ * (log_betas_[i] - log_norm));  // they sum to 1
-      if (weight < kNegligible) continue;
+      const double log_weight = p_ * (log_betas_[i] - log_norm_);
+      if (log_weight < kNegligible) continue;
+      const double weight = std::exp(log_weight);  // they sum to 1
       const Vector gradient = model.value_and_gradient(points_[i]).gradient;
       mean += weight * gradient;
       square.selfadjointView<Eigen::Lower>().rankUpdate(gradient, weight);
     }
     square.triangularView<Eigen::StrictlyUpper>() = square.transpose();
-    return {log_volume(x) + 3 * log_norm, log_volume_gradient(x) + 3 * mean,
+    return {log_volume(x) + 3 * log_norm_, log_volume_gradient(x) + 3 * mean,
             3 * p_ * (square - mean * mean.transpose())};
   }
 
  private:
-  static constexpr double kNegligible = 1e-9;  ///< of the sum of weights
+  static constexpr double kNegligible = -20.7;  ///< log of a weight's share in their sum
+  static constexpr double kLost = -45;          ///< log of what, added to 1 a thousand times, leaves it 1
 
   double log_p_norm() const {
     const double farthest = *std::max_element(log_betas_.begin(), log_betas_.end());
     double sum = 0;
-    for (const double log_beta : log_betas_) sum += std::exp(p_ * (log_beta - farthest));
+    for (const double log_beta : log_betas_) {
+      const double log_term = p_ * (log_beta - farthest);
+      if (!(log_term < kLost)) sum += std::exp(log_term);  // NaN: keep
+    }
     return farthest + std::log(sum) / p_;
   }
 
   std::span<const Vec3d> points_;
   Eigen::Matrix3d part_axes_;
   double p_;
-  std::vector<double> log_betas_;
+  std::vector<double> log_betas_;  ///< and their norm, at the last x
+  double log_norm_ = 0;
 };
 
 /// The Newton step of `model` with Marquardt's damping; parameters that would leave their bounds do not move.
@@ -88,6 +94,7 @@ FitStop minimise(Vector& x, InflatedVolume& objective, const Bounds& bounds, int
   constexpr double kGain = 1e-6;  // of the log-volume: further steps would not show in a part
   constexpr double kMaxDamping = 1e8;
   double damping = 1e-2;
+  objective.value(x);
   Objective model = objective.with_derivatives(x);
   for (int k = 0; k < max_iterations; ++k) {
     if (damping >= kMaxDamping) return FitStop::kNoDescent;
