@@ -26,6 +26,9 @@ constexpr double kWorstError = 0.2;
 constexpr double kRefineShare = 0.7;
 // A split pays if it lowers the error by more than this share of what each part of a full count may err.
 constexpr double kPartPrice = 0.3;
+// Splits that paid took off half of what their piece erred, or less: one that errs by less than this many
+// prices is left alone.
+constexpr double kWorthSplitting = 2;
 // Which piece is split goes by its share of the error and, this much, by its share of the volume that
 // superquadrics enclose beside the mesh: where that is large maps see the surface from far off and at a
 // slant.
@@ -144,7 +147,8 @@ class Refiner {
   /// Splits the worst piece of those with a cut left to try, and keeps the split if it pays. False: no piece
   /// has one.
   Result<bool> split_worst() {
-    const std::optional<std::size_t> worst = worst_of([&](Piece& piece) { return can_split(piece); });
+    const std::optional<std::size_t> worst =
+        worst_of(kWorthSplitting * price_m(), [&](Piece& piece) { return can_split(piece); });
     if (!worst) return false;
     Piece before = pieces[*worst];
     const std::vector<double> error_before_m = error_m_;
@@ -165,7 +169,8 @@ class Refiner {
   /// enough.
   Result<bool> split_on_trial() {
     if (trials_ == kMostTrials) return false;
-    const std::optional<std::size_t> worst = worst_of([](Piece& piece) { return piece.spare.has_value(); });
+    const std::optional<std::size_t> worst =
+        worst_of(0, [](Piece& piece) { return piece.spare.has_value(); });
     if (!worst) return false;
     ++trials_;
     if (auto outcome = split(*worst, pieces[*worst].spare->cut); !outcome) return outcome.error();
@@ -220,16 +225,16 @@ class Refiner {
     return burden;
   }
 
-  /// The piece with the greatest burden of those that err and `may` be split.
+  /// The piece with the greatest burden of those that err by more than `least_m` and `may` be split.
   template <class May>
-  std::optional<std::size_t> worst_of(const May& may) {
+  std::optional<std::size_t> worst_of(double least_m, const May& may) {
     const std::vector<double> burden = burdens();
     std::vector<std::size_t> order(pieces.size());
     std::iota(order.begin(), order.end(), std::size_t{0});
     std::stable_sort(order.begin(), order.end(),
                      [&](std::size_t a, std::size_t b) { return burden[a] > burden[b]; });
     for (const std::size_t k : order)
-      if (error_m_[k] > 0 && may(pieces[k])) return k;
+      if (error_m_[k] > least_m && may(pieces[k])) return k;
     return std::nullopt;
   }
 
