@@ -87,13 +87,13 @@ int MeshQueries::winding(const Vec3d& p_m, const Vec3d& direction,
   return static_cast<int>(std::lround(oracle.winding_number(p_m)));
 }
 
-double MeshQueries::signed_distance(const Vec3d& p_m) const {
+double MeshQueries::signed_distance(const Vec3d& p_m, double at_most_m) const {
   // Any direction serves; this one lies in no plane that models are aligned with.
   const Vec3d direction = normalized(Vec3d{0.3217, 0.5431, 0.7757});
   if (open.can_mislead(p_m, direction)) return oracle.signed_distance(p_m);
   std::vector<RayTracer::Hit> hits;
   rays.trace_line(p_m, direction, hits);
-  const double distance_m = oracle.nearest(p_m).distance_m;
+  const double distance_m = oracle.nearest(p_m, at_most_m).distance_m;
   return winding(p_m, direction, hits) > 0 ? -distance_m : distance_m;
 }
 
@@ -110,13 +110,17 @@ RayField trace_map(const Superquadric& shape, const Pose& object_from_part, std:
   std::vector<Row> by_row(rows);
   tbb::parallel_for(tbb::blocked_range<std::uint32_t>(0, rows, 4),
                     [&](const tbb::blocked_range<std::uint32_t>& range) {
-                      std::vector<RayTracer::Hit> hits;
+                      std::vector<RayTracer::Ray> rays(cols);
+                      std::vector<std::vector<RayTracer::Hit>> hits_of(cols);
                       for (std::uint32_t row = range.begin(); row != range.end(); ++row) {
                         Row& out = by_row[row];
+                        for (std::uint32_t col = 0; col < cols; ++col)
+                          rays[col] = {turn.apply(grid.point(row, col)) + object_from_part.translation_m,
+                                       -turn.apply(grid.normal(row, col))};
+                        queries.rays.trace_lines(rays, hits_of);
                         for (std::uint32_t col = 0; col < cols; ++col) {
-                          const Vec3d p_m = turn.apply(grid.point(row, col)) + object_from_part.translation_m;
-                          const Vec3d inward = -turn.apply(grid.normal(row, col));
-                          queries.rays.trace_line(p_m, inward, hits);
+                          const auto& [p_m, inward] = rays[col];
+                          const std::vector<RayTracer::Hit>& hits = hits_of[col];
                           int winding = queries.winding(p_m, inward, hits);
                           const double reach_m = reach.at(row, col);
                           out.start_inside.push_back(winding > 0 ? 1 : 0);

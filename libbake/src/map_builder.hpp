@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <vector>
 
 #include "sqmap/asset/asset.hpp"
@@ -37,8 +38,8 @@ struct MeshQueries {
   /// Winding number of the mesh at p, rounded. `line_hits`: the crossings of the line through p along the
   /// unit vector `direction`, t_m = 0 at p; where the mesh is closed they tell it at once.
   int winding(const Vec3d& p_m, const Vec3d& direction, const std::vector<RayTracer::Hit>& line_hits) const;
-  /// Negative inside [m].
-  double signed_distance(const Vec3d& p_m) const;
+  /// Negative inside [m]. `at_most_m`: as of Oracle::nearest.
+  double signed_distance(const Vec3d& p_m, double at_most_m = std::numeric_limits<double>::infinity()) const;
 };
 
 /// Traces the inward ray of every node of a rows x cols map through the whole mesh (paper 4.1.2 with the

@@ -174,6 +174,7 @@ ShellPoints sample_shell(const MeshQueries& queries, double half_width_m, std::u
   shell.points_m.resize(count);
   shell.face.resize(count);
   shell.signed_distance_m.resize(count);
+  std::vector<Vec3d> surface_m(count);
   std::mt19937_64 engine(seed);
   for (std::uint32_t i = 0; i < count; ++i) {
     const double pick = uniform(engine) * sum, u = uniform(engine), v = uniform(engine), w = uniform(engine);
@@ -183,13 +184,15 @@ ShellPoints sample_shell(const MeshQueries& queries, double half_width_m, std::u
     const auto& f = mesh.faces[face];
     const Vec3d &a = mesh.vertices_m[f[0]], &b = mesh.vertices_m[f[1]], &c = mesh.vertices_m[f[2]];
     const double root = std::sqrt(u);
-    const Vec3d surface_m = (1 - root) * a + root * (1 - v) * b + root * v * c;
-    shell.points_m[i] = cast<float>(surface_m + (2 * w - 1) * half_width_m * normalized(cross(b - a, c - a)));
+    surface_m[i] = (1 - root) * a + root * (1 - v) * b + root * v * c;
+    shell.points_m[i] =
+        cast<float>(surface_m[i] + (2 * w - 1) * half_width_m * normalized(cross(b - a, c - a)));
     shell.face[i] = static_cast<std::uint32_t>(face);
   }
   tbb::parallel_for(0U, count, [&](std::uint32_t i) {
     // The truth of the point as rounded to float, which is what the runtime is asked.
-    shell.signed_distance_m[i] = queries.signed_distance(cast<double>(shell.points_m[i]));
+    const Vec3d point_m = cast<double>(shell.points_m[i]);
+    shell.signed_distance_m[i] = queries.signed_distance(point_m, norm(point_m - surface_m[i]));
   });
   return shell;
 }

@@ -4,51 +4,23 @@
 #include <cmath>
 #include <limits>
 
-#include <CGAL/AABB_traits.h>
-#include <CGAL/AABB_tree.h>
-#include <CGAL/AABB_triangle_primitive.h>
-#include <CGAL/Simple_cartesian.h>
-
+#include "mesh_boxes.hpp"
 #include "winding_tree.hpp"
 
 namespace sqmap::bake {
 namespace {
 
-// Closest points need no exact predicates: they are rounded when they are stored in any case.
-using Kernel = CGAL::Simple_cartesian<double>;
-using Triangles = std::vector<Kernel::Triangle_3>;
-using Primitive = CGAL::AABB_triangle_primitive<Kernel, Triangles::const_iterator>;
-using Tree = CGAL::AABB_tree<CGAL::AABB_traits<Kernel, Primitive>>;
-
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
-
-Kernel::Point_3 to_cgal(const Vec3d& p) { return {p.x, p.y, p.z}; }
-
-Triangles triangles_of(const Mesh& mesh) {
-  Triangles triangles;
-  triangles.reserve(mesh.faces.size());
-  for (const auto& [a, b, c] : mesh.faces)
-    triangles.emplace_back(to_cgal(mesh.vertices_m[a]), to_cgal(mesh.vertices_m[b]),
-                           to_cgal(mesh.vertices_m[c]));
-  return triangles;
-}
 
 }  // namespace
 
 struct Oracle::Impl {
   explicit Impl(const Mesh& mesh)
-      : triangles(triangles_of(mesh)),
-        tree(triangles.cbegin(), triangles.cend()),
-        winding(mesh.vertices_m, mesh.faces) {
-    // Both would otherwise happen within the first query, which const queries from several threads must not
-    // share.
-    tree.build();
-    tree.accelerate_distance_queries();
-  }
+      : boxes(mesh), winding(mesh.vertices_m, mesh.faces), is_empty(mesh.faces.empty()) {}
 
-  Triangles triangles;
-  Tree tree;
+  MeshBoxes boxes;
   WindingTree winding;
+  bool is_empty;
 };
 
 Oracle::Oracle(const Mesh& mesh) : impl_(std::make_unique<Impl>(mesh)) {}
@@ -56,14 +28,9 @@ Oracle::~Oracle() = default;
 Oracle::Oracle(Oracle&&) noexcept = default;
 Oracle& Oracle::operator=(Oracle&&) noexcept = default;
 
-Oracle::Answer Oracle::nearest(const Vec3d& p_m) const {
-  if (impl_->triangles.empty() || !std::isfinite(p_m.x + p_m.y + p_m.z))
-    return {kNan, {kNan, kNan, kNan}, kNewFace};
-  const auto [point, primitive] = impl_->tree.closest_point_and_primitive(to_cgal(p_m));
-  const Vec3d nearest_m{point.x(), point.y(), point.z()};
-  const Vec3d d_m = nearest_m - p_m;
-  return {std::hypot(d_m.x, d_m.y, d_m.z), nearest_m,
-          static_cast<std::uint32_t>(primitive - impl_->triangles.cbegin())};
+Oracle::Answer Oracle::nearest(const Vec3d& p_m, double at_most_m) const {
+  if (impl_->is_empty || !std::isfinite(p_m.x + p_m.y + p_m.z)) return {kNan, {kNan, kNan, kNan}, kNewFace};
+  return impl_->boxes.nearest(p_m, at_most_m);
 }
 
 double Oracle::winding_number(const Vec3d& p_m) const { return impl_->winding.at(p_m); }
@@ -73,6 +40,25 @@ bool Oracle::inside(const Vec3d& p_m) const { return winding_number(p_m) > 0.5; 
 double Oracle::signed_distance(const Vec3d& p_m) const {
   const double distance_m = nearest(p_m).distance_m;
   return inside(p_m) ? -distance_m : distance_m;
+}
+
+RayTracer::RayTracer(const Mesh& mesh) : boxes_(std::make_unique<MeshBoxes>(mesh)) {}
+RayTracer::~RayTracer() = default;
+RayTracer::RayTracer(RayTracer&&) noexcept = default;
+RayTracer& RayTracer::operator=(RayTracer&&) noexcept = default;
+
+void RayTracer::trace(const Vec3d& origin_m, const Vec3d& direction, std::vector<Hit>& hits) const {
+  const Ray ray{origin_m, direction};
+  boxes_->trace({&ray, 1}, false, {&hits, 1});
+}
+
+void RayTracer::trace_line(const Vec3d& origin_m, const Vec3d& direction, std::vector<Hit>& hits) const {
+  const Ray ray{origin_m, direction};
+  boxes_->trace({&ray, 1}, true, {&hits, 1});
+}
+
+void RayTracer::trace_lines(std::span<const Ray> lines, std::span<std::vector<Hit>> hits) const {
+  boxes_->trace(lines, true, hits);
 }
 
 }  // namespace sqmap::bake

@@ -54,7 +54,7 @@ THIRD_PARTY = {
                                            "libbake/src/fit_volume.cpp", "libbake/src/heat_method.cpp",
                                            "libbake/src/partition.cpp"]),
     "assimp": (("assimp/",), ["libbake/src/scene_reader.cpp", "apps/common/source_mesh.cpp"]),
-    "Embree": (("embree",), ["libbake/src/ray_tracer.cpp", "apps/sqbench/embree_closest.cpp", VERSIONS]),
+    "Embree": (("embree",), ["libbake/src/mesh_boxes.cpp", "apps/sqbench/embree_closest.cpp", VERSIONS]),
     "Highway": (("hwy/",), ["apps/sqbench/grid_kernels.cpp", "libruntime/src/engine.cpp", VERSIONS]),
     "FCL": (("fcl/",), ["apps/sqbench/peer_fcl.cpp", VERSIONS]),
     "TBB": (("tbb/", "oneapi/"), ["libbake/src/*.cpp", "apps/sqbake/worker_pool.cpp",

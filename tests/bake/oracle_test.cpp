@@ -153,6 +153,30 @@ TEST(Oracle, WindingNumberErrorIsBelowOneHundredth) {
   }
 }
 
+TEST(Oracle, KnowingABoundOfTheDistanceChangesNoAnswer) {
+  const Oracle oracle(test::torus(2, 0.5, 32, 16));
+  Random random(14);
+  for (int i = 0; i < 1000; ++i) {
+    const Vec3d p = random.point(3);
+    const Oracle::Answer free = oracle.nearest(p);
+    for (const double more : {1.0, 1 + 1e-12, 1.5}) {
+      const Oracle::Answer bounded = oracle.nearest(p, more * free.distance_m);
+      EXPECT_EQ(bounded.distance_m, free.distance_m);
+      EXPECT_EQ(bounded.face, free.face);
+    }
+  }
+}
+
+TEST(Oracle, NearestIsExactHoweverFarThePoint) {
+  const Oracle oracle(test::box({1, 2, 3}));
+  for (const double far_m : {2.0, 1e2, 5e3, 1e4, 1e9, 1e15}) {
+    EXPECT_NEAR(oracle.nearest({far_m, 0.3, 0.1}).distance_m, far_m - 1, 2e-15 * far_m) << far_m;
+    const Oracle::Answer corner = oracle.nearest({far_m, far_m + 1, far_m + 2});
+    EXPECT_NEAR(corner.distance_m / ((far_m - 1) * std::sqrt(3.0)), 1, 1e-14) << far_m;
+    EXPECT_NEAR(norm(corner.nearest_m - Vec3d{1, 2, 3}), 0, 1e-14) << far_m;
+  }
+}
+
 TEST(Oracle, AnswersScaleWithTheMeshAndItsPlace) {
   const Mesh mesh = test::l_shape(1, 0.3);
   const Oracle base(mesh);
@@ -243,6 +267,43 @@ TEST(RayTracer, ALineIsTheRayAndTheRayBackwards) {
     EXPECT_NE(line[1 - k].entering, behind[k].entering);
     EXPECT_NEAR(line[2 + k].t_m, ahead[k].t_m, 1e-12);
     EXPECT_EQ(line[2 + k].entering, ahead[k].entering);
+  }
+}
+
+void expect_together_as_alone(const Mesh& mesh, const std::vector<RayTracer::Ray>& lines) {
+  const RayTracer tracer(mesh);
+  std::vector<std::vector<RayTracer::Hit>> together(lines.size(), std::vector<RayTracer::Hit>(3));
+  tracer.trace_lines(lines, together);
+  std::vector<RayTracer::Hit> alone;
+  std::size_t count = 0;
+  for (std::size_t k = 0; k < lines.size(); ++k) {
+    tracer.trace_line(lines[k].origin_m, lines[k].direction, alone);
+    ASSERT_EQ(together[k].size(), alone.size()) << k;
+    for (std::size_t i = 0; i < alone.size(); ++i) {
+      EXPECT_EQ(together[k][i].t_m, alone[i].t_m);
+      EXPECT_EQ(together[k][i].face, alone[i].face);
+      EXPECT_EQ(together[k][i].entering, alone[i].entering);
+    }
+    count += alone.size();
+  }
+  EXPECT_GT(count, lines.size() / 2);
+}
+
+TEST(RayTracer, LinesTogetherMeetWhatTheyMeetAlone) {
+  std::vector<RayTracer::Ray> parallel, around, any;
+  Random random(12);
+  for (int k = 0; k < 200; ++k) {
+    parallel.push_back({{-1.01 + 0.0131 * k, -0.9 + 0.008 * k, 1.1}, {0, 0, -1}});
+    any.push_back({random.point(0.5), random.direction()});
+    // The normals of a rounded box: along an axis for most of the way round.
+    const double angle = 2 * std::numbers::pi * k / 200;
+    const Vec3d out = normalized(Vec3d{std::pow(std::cos(angle), 39), std::pow(std::sin(angle), 39), 0});
+    around.push_back({1.01 / std::max(std::abs(out.x), std::abs(out.y)) * out + Vec3d{0, 0, 0.1}, -out});
+  }
+  any[20].direction = {0, 0, 0};  // none
+  for (const auto& lines : {parallel, around, any}) {
+    expect_together_as_alone(test::box({1, 1, 1}), lines);
+    expect_together_as_alone(test::torus(0.7, 0.3, 64, 32), lines);
   }
 }
 

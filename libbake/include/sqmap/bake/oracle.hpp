@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <span>
 #include <vector>
@@ -10,9 +11,11 @@
 
 namespace sqmap::bake {
 
-/// Exact closest-point queries against a mesh (CGAL AABB tree), with the sign from the generalised winding
-/// number (Jacobson et al. 2013; Barill et al. 2018), so that open meshes have an inside too. Thread-safe
-/// once built.
+class MeshBoxes;
+
+/// Exact closest-point queries against a mesh (Embree finds the triangles), with the sign from the
+/// generalised winding number (Jacobson et al. 2013; Barill et al. 2018), so that open meshes have an inside
+/// too. Thread-safe once built.
 class Oracle {
  public:
   explicit Oracle(const Mesh& mesh);
@@ -25,8 +28,9 @@ class Oracle {
     Vec3d nearest_m;     ///< that point
     std::uint32_t face;  ///< a face that holds it
   };
-  /// NaN and kNewFace where p is not finite or the mesh has no faces.
-  Answer nearest(const Vec3d& p_m) const;
+  /// Of equally near faces the lowest. NaN and kNewFace where p is not finite or the mesh has no faces.
+  /// `at_most_m`: the distance is known not to exceed it, which makes the search shorter.
+  Answer nearest(const Vec3d& p_m, double at_most_m = std::numeric_limits<double>::infinity()) const;
   /// Generalised winding number at p: about 1 inside a closed outward mesh, 0 outside, fractions near holes.
   /// Evaluated hierarchically (second-order expansion per tree node) with error below 0.01 away from the
   /// surface.
@@ -51,6 +55,9 @@ class RayTracer {
   RayTracer(RayTracer&&) noexcept;
   RayTracer& operator=(RayTracer&&) noexcept;
 
+  struct Ray {
+    Vec3d origin_m, direction;
+  };
   struct Hit {
     double t_m;  ///< distance along the ray
     std::uint32_t face;
@@ -63,10 +70,12 @@ class RayTracer {
   void trace(const Vec3d& origin_m, const Vec3d& direction, std::vector<Hit>& hits) const;
   /// As trace, of the whole line: t_m < 0 behind the origin.
   void trace_line(const Vec3d& origin_m, const Vec3d& direction, std::vector<Hit>& hits) const;
+  /// As trace_line, of many lines; neighbours in `lines` that are neighbours in space are traced together.
+  /// hits: [lines.size()].
+  void trace_lines(std::span<const Ray> lines, std::span<std::vector<Hit>> hits) const;
 
  private:
-  struct Impl;
-  std::unique_ptr<Impl> impl_;
+  std::unique_ptr<MeshBoxes> boxes_;
 };
 
 }  // namespace sqmap::bake

@@ -1,17 +1,22 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include "mesh_boxes.hpp"
+
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
 #include <new>
+#include <optional>
 #include <utility>
 
 #include <embree3/rtcore.h>
 
-#include "sqmap/bake/oracle.hpp"
-
 namespace sqmap::bake {
 namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+/// Rays that Embree traces together. Not as coherent ones: there it missed boxes beside rays along an axis.
+constexpr std::size_t kPacket = 16;
 
 /// Indexed by axis: the axes that a ray is tested along are known only at run time.
 using Corner = std::array<double, 3>;
@@ -34,6 +39,7 @@ constexpr double kSamePlace = 1e-12;
 /// passes it.
 class ExactRay {
  public:
+  ExactRay() = default;
   ExactRay(const Vec3d& origin, const Vec3d& direction) {
     if (std::abs(direction.y) > std::abs(direction.x)) z_ = 1;
     if (std::abs(direction.z) > std::abs(direction[z_])) z_ = 2;
@@ -83,12 +89,21 @@ class ExactRay {
   double shear_x_ = 0, shear_y_ = 0, per_z_ = 0;
 };
 
-/// What the box callback needs of the query it serves.
-struct Query {
+/// What the box callback needs of the rays it serves.
+struct RayQuery {
   RTCIntersectContext context;  // first: the callback is given its address
-  const ExactRay* ray;
-  double first_t;  ///< crossings before it do not count
-  std::vector<RayTracer::Hit>* hits;
+  double first_t;               ///< crossings before it do not count
+  std::array<ExactRay, kPacket> rays;
+  std::vector<RayTracer::Hit>* hits;  ///< of each ray
+};
+
+/// What the box callback needs of the point it serves, and the nearest point so far.
+struct PointQuery {
+  const Triangle* triangles;
+  Vec3d p;
+  Vec3d nearest;
+  double square = kInfinity;  ///< of the distance
+  std::uint32_t face = kNewFace;
 };
 
 void bound(const RTCBoundsFunctionArguments* arguments) {
@@ -108,18 +123,79 @@ void bound(const RTCBoundsFunctionArguments* arguments) {
   box.upper_z = static_cast<float>(high[2] + kBoxMargin);
 }
 
-/// Notes a crossing and leaves the ray as it is, so that Embree goes on through all boxes on its way.
+/// Notes crossings and leaves the rays as they are, so that Embree goes on through all boxes on their way.
 void intersect(const RTCIntersectFunctionNArguments* arguments) {
   const Triangle& triangle = static_cast<const Triangle*>(arguments->geometryUserPtr)[arguments->primID];
-  const auto* query = reinterpret_cast<const Query*>(arguments->context);
-  RayTracer::Hit hit{0, arguments->primID, false};
-  if (query->ray->crosses(triangle, hit.t_m, hit.entering) && hit.t_m >= query->first_t)
-    query->hits->push_back(hit);
+  const auto* query = reinterpret_cast<const RayQuery*>(arguments->context);
+  RTCRayN* rays = RTCRayHitN_RayN(arguments->rayhit, arguments->N);
+  for (unsigned i = 0; i < arguments->N; ++i) {
+    if (arguments->valid[i] == 0) continue;
+    const unsigned ray = RTCRayN_id(rays, arguments->N, i);
+    RayTracer::Hit hit{0, arguments->primID, false};
+    if (query->rays[ray].crosses(triangle, hit.t_m, hit.entering) && hit.t_m >= query->first_t)
+      query->hits[ray].push_back(hit);
+  }
+}
+
+/// Point of the segment a b nearest to p; a where its length is 0.
+Vec3d nearest_of_segment(const Vec3d& p, const Vec3d& a, const Vec3d& b) {
+  const Vec3d along = b - a;
+  const double length2 = dot(along, along);
+  const double t = length2 > 0 ? std::clamp(dot(p - a, along) / length2, 0.0, 1.0) : 0;
+  return t == 1 ? b : a + t * along;
+}
+
+/// Point of the triangle nearest to p: below p where the prism of the triangle holds p, else on an edge.
+Vec3d nearest_of_triangle(const Vec3d& p, const std::array<Vec3d, 3>& corner) {
+  const Vec3d n = cross(corner[1] - corner[0], corner[2] - corner[0]);
+  const double n2 = dot(n, n);
+  bool in_prism = n2 > 0;
+  for (std::size_t k = 0; k < 3 && in_prism; ++k)
+    in_prism = dot(cross(n, corner[(k + 1) % 3] - corner[k]), p - corner[k]) >= 0;
+  if (in_prism) return p - dot(n, p - corner[0]) / n2 * n;
+  Vec3d nearest;
+  double least = kInfinity;
+  for (std::size_t k = 0; k < 3; ++k) {
+    const Vec3d q = nearest_of_segment(p, corner[k], corner[(k + 1) % 3]);
+    const double square = dot(q - p, q - p);
+    if (!(square < least)) continue;
+    least = square;
+    nearest = q;
+  }
+  return nearest;
+}
+
+/// A radius, for Embree, that no box of what lies within `distance` of p is beyond.
+float radius_for(double distance, const Vec3d& p) {
+  constexpr double kFloat = 1e-6;  // several roundings of float
+  return static_cast<float>((1 + kFloat) * distance + kFloat * norm(p) + 2 * kBoxMargin);
+}
+
+Vec3d vec(const Corner& p) { return {p[0], p[1], p[2]}; }
+
+/// Keeps the nearest point; of equally near ones, that of the lowest face, whatever the order of boxes.
+bool look_at(std::uint32_t face, PointQuery& query) {
+  const Triangle& t = query.triangles[face];
+  const Vec3d q = nearest_of_triangle(query.p, {vec(t[0]), vec(t[1]), vec(t[2])});
+  const double square = dot(q - query.p, q - query.p);
+  if (!(square < query.square || (square == query.square && face < query.face))) return false;
+  query.nearest = q;
+  query.square = square;
+  query.face = face;
+  return true;
+}
+
+/// Tells Embree whether it may look nearer by than before.
+bool look(RTCPointQueryFunctionArguments* arguments) {
+  auto& query = *static_cast<PointQuery*>(arguments->userPtr);
+  if (!look_at(arguments->primID, query)) return false;
+  arguments->query->radius = std::min(arguments->query->radius, radius_for(std::sqrt(query.square), query.p));
+  return true;
 }
 
 }  // namespace
 
-struct RayTracer::Impl {
+struct MeshBoxes::Impl {
   explicit Impl(const Mesh& mesh) : faces(mesh.faces) {
     normalise(mesh);
     // Embree would reserve 128 MB for the tessellation of surfaces that are not here.
@@ -175,8 +251,16 @@ struct RayTracer::Impl {
     return {p.x, p.y, p.z};
   }
 
-  /// All crossings with t >= first_t, which is 0 or -infinity.
-  void trace(const Vec3d& origin_m, const Vec3d& direction, double first_t, std::vector<Hit>& hits) const;
+  struct FloatRay {
+    Vec3f from, along;
+  };
+  /// A ray as Embree sees it, and as its crossings are computed; nothing if it is none.
+  std::optional<FloatRay> float_ray(const Ray& ray, double first_t, ExactRay& exact) const;
+  void trace_one(const Ray& ray, RayQuery& query) const;
+  /// At most kPacket.
+  void trace_packet(std::span<const Ray> rays, RayQuery& query) const;
+  /// From crossings in the unit box, in any order.
+  void finish(std::vector<RayTracer::Hit>& hits) const;
 
   bool touch(std::uint32_t f, std::uint32_t g) const {
     return std::ranges::any_of(faces[f],
@@ -191,28 +275,23 @@ struct RayTracer::Impl {
   RTCScene scene = nullptr;
 };
 
-RayTracer::RayTracer(const Mesh& mesh) : impl_(std::make_unique<Impl>(mesh)) {}
-RayTracer::~RayTracer() = default;
-RayTracer::RayTracer(RayTracer&&) noexcept = default;
-RayTracer& RayTracer::operator=(RayTracer&&) noexcept = default;
-
-void RayTracer::Impl::trace(const Vec3d& origin_m, const Vec3d& direction, double first_t,
-                            std::vector<Hit>& hits) const {
-  hits.clear();
-  const Vec3d origin = unit(origin_m);
-  if (!(std::abs(norm(direction) - 1) < 1e-3) || !std::isfinite(norm(origin))) return;  // NaN: no ray
-
+std::optional<MeshBoxes::Impl::FloatRay> MeshBoxes::Impl::float_ray(const Ray& ray, double first_t,
+                                                                    ExactRay& exact) const {
+  const Vec3d origin = unit(ray.origin_m);
+  if (!(std::abs(norm(ray.direction) - 1) < 1e-3) || !std::isfinite(norm(origin)))
+    return std::nullopt;  // NaN: no ray
+  exact = ExactRay(origin, ray.direction);
   // A line, or a ray from far away, is started, for Embree, at the sphere round the unit box, where float is
   // dense enough; and all a little early, so that boxes round t = 0 count.
   constexpr double kSphere = 1;  // the corners of the box are at sqrt(3) / 2
-  const double start = std::max(first_t, -dot(origin, direction) - kSphere) - 4 * kBoxMargin;
-  const Vec3f from = cast<float>(origin + start * direction), along = cast<float>(direction);
-  const ExactRay ray(origin, direction);
-  Query query{};
-  rtcInitIntersectContext(&query.context);
-  query.ray = &ray;
-  query.first_t = first_t;
-  query.hits = &hits;
+  const double start = std::max(first_t, -dot(origin, ray.direction) - kSphere) - 4 * kBoxMargin;
+  return FloatRay{cast<float>(origin + start * ray.direction), cast<float>(ray.direction)};
+}
+
+void MeshBoxes::Impl::trace_one(const Ray& ray, RayQuery& query) const {
+  const auto start = float_ray(ray, query.first_t, query.rays[0]);
+  if (!start) return;
+  const auto& [from, along] = *start;
   RTCRayHit rayhit{};
   rayhit.ray = {from.x, from.y, from.z, 0, along.x, along.y, along.z, 0, 0, 0, 0, 0};
   rayhit.ray.tfar = std::numeric_limits<float>::infinity();
@@ -220,7 +299,36 @@ void RayTracer::Impl::trace(const Vec3d& origin_m, const Vec3d& direction, doubl
   rayhit.hit.geomID = RTC_INVALID_GEOMETRY_ID;
   rayhit.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
   rtcIntersect1(scene, &query.context, &rayhit);
+}
 
+void MeshBoxes::Impl::trace_packet(std::span<const Ray> rays, RayQuery& query) const {
+  alignas(64) std::array<int, kPacket> valid{};
+  RTCRayHit16 packet;
+  for (std::size_t k = 0; k < rays.size(); ++k) {
+    const auto start = float_ray(rays[k], query.first_t, query.rays[k]);
+    if (!start) continue;
+    valid[k] = -1;
+    const auto& [from, along] = *start;
+    RTCRay16& ray = packet.ray;
+    ray.org_x[k] = from.x;
+    ray.org_y[k] = from.y;
+    ray.org_z[k] = from.z;
+    ray.dir_x[k] = along.x;
+    ray.dir_y[k] = along.y;
+    ray.dir_z[k] = along.z;
+    ray.tnear[k] = ray.time[k] = 0;
+    ray.tfar[k] = std::numeric_limits<float>::infinity();
+    ray.mask[k] = 0xFFFFFFFF;
+    ray.id[k] = static_cast<unsigned>(k);
+    ray.flags[k] = 0;
+    packet.hit.geomID[k] = RTC_INVALID_GEOMETRY_ID;
+    packet.hit.instID[0][k] = RTC_INVALID_GEOMETRY_ID;
+  }
+  rtcIntersect16(valid.data(), scene, &query.context, &packet);
+}
+
+void MeshBoxes::Impl::finish(std::vector<RayTracer::Hit>& hits) const {
+  using Hit = RayTracer::Hit;
   for (Hit& hit : hits) hit.t_m *= size_m;
   std::ranges::sort(
       hits, [](const Hit& a, const Hit& b) { return a.t_m != b.t_m ? a.t_m < b.t_m : a.face < b.face; });
@@ -238,12 +346,42 @@ void RayTracer::Impl::trace(const Vec3d& origin_m, const Vec3d& direction, doubl
   }
 }
 
-void RayTracer::trace(const Vec3d& origin_m, const Vec3d& direction, std::vector<Hit>& hits) const {
-  impl_->trace(origin_m, direction, 0, hits);
+MeshBoxes::MeshBoxes(const Mesh& mesh) : impl_(std::make_unique<Impl>(mesh)) {}
+MeshBoxes::~MeshBoxes() = default;
+
+void MeshBoxes::trace(std::span<const Ray> rays, bool whole_lines,
+                      std::span<std::vector<RayTracer::Hit>> hits) const {
+  RayQuery query{};
+  rtcInitIntersectContext(&query.context);
+  query.first_t = whole_lines ? -kInfinity : 0;
+  for (std::size_t begin = 0; begin < rays.size(); begin += kPacket) {
+    const std::size_t count = std::min(kPacket, rays.size() - begin);
+    const auto lists = hits.subspan(begin, count);
+    for (auto& list : lists) list.clear();
+    query.hits = lists.data();
+    if (count == 1) {
+      impl_->trace_one(rays[begin], query);
+    } else {
+      impl_->trace_packet(rays.subspan(begin, count), query);
+    }
+    for (auto& list : lists) impl_->finish(list);
+  }
 }
 
-void RayTracer::trace_line(const Vec3d& origin_m, const Vec3d& direction, std::vector<Hit>& hits) const {
-  impl_->trace(origin_m, direction, -std::numeric_limits<double>::infinity(), hits);
+Oracle::Answer MeshBoxes::nearest(const Vec3d& p_m, double at_most_m) const {
+  PointQuery query{impl_->triangles.data(), impl_->unit(p_m), {}};
+  constexpr double kFar = 1e3;  // floats tell boxes apart only near them
+  if (norm(query.p) < kFar) {
+    RTCPointQueryContext context;
+    rtcInitPointQueryContext(&context);
+    const Vec3f p = cast<float>(query.p);
+    RTCPointQuery embree{p.x, p.y, p.z, 0, radius_for(at_most_m / impl_->size_m, query.p)};
+    rtcPointQuery(impl_->scene, &embree, &context, look, &query);
+  } else {
+    for (std::uint32_t face = 0; face < impl_->triangles.size(); ++face) look_at(face, query);
+  }
+  return {impl_->size_m * std::sqrt(query.square), impl_->centre_m + impl_->size_m * query.nearest,
+          query.face};
 }
 
 }  // namespace sqmap::bake
