@@ -29,6 +29,13 @@ class LoadTest(FolderTest):
         for run in ("j1", "j2"):
             self.assertEqual(sorted(p.name for p in (kept / run).iterdir()), ["00000_box.h5", "00001_box.h5"])
 
+    def test_the_run_with_one_thread_may_bake_the_first_only(self):
+        kept = self.folder / "kept"
+        code, rows, text = self.load(BIN, "--keep", kept, "--alone", "1")
+        self.assertEqual((code, rows), (0, [(1, 0, 0, 0), (2, 0, 0, 0)]), text)
+        for run, count in (("j1", 1), ("j2", 2)):
+            self.assertEqual(len(list((kept / run).iterdir())), count)
+
     def test_what_is_left_over_or_not_baked_is_counted(self):
         for trick, row in (("sleep 100 >/dev/null 2>&1 &", (1, 0, 0)),
                            ('mkdir -p "$4"; touch "$4/stray"; echo > "$2/00000_box.ply"', (0, 1, 1))):
