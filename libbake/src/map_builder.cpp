@@ -84,7 +84,7 @@ int MeshQueries::winding(const Vec3d& p_m, const Vec3d& direction,
     // What leaves the material ahead must have been entered before.
     if (ahead >= 0 && ahead + behind == 0) return ahead;
   }
-  return static_cast<int>(std::lround(oracle.winding_number(p_m)));
+  return oracle.rounded_winding_number(p_m);
 }
 
 double MeshQueries::signed_distance(const Vec3d& p_m, double at_most_m) const {

@@ -35,7 +35,9 @@ Oracle::Answer Oracle::nearest(const Vec3d& p_m, double at_most_m) const {
 
 double Oracle::winding_number(const Vec3d& p_m) const { return impl_->winding.at(p_m); }
 
-bool Oracle::inside(const Vec3d& p_m) const { return winding_number(p_m) > 0.5; }  // NaN: outside
+int Oracle::rounded_winding_number(const Vec3d& p_m) const { return impl_->winding.rounded_at(p_m); }
+
+bool Oracle::inside(const Vec3d& p_m) const { return rounded_winding_number(p_m) > 0; }
 
 double Oracle::signed_distance(const Vec3d& p_m) const {
   const double distance_m = nearest(p_m).distance_m;

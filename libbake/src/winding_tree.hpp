@@ -21,12 +21,15 @@ class WindingTree {
 
   /// Error below 0.01 off the surface. NaN where p is not finite.
   double at(const Vec3d& p_m) const;
+  /// at(), rounded; less than half of its work where the nearest integer is plain to see. 0 where p is not
+  /// finite.
+  int rounded_at(const Vec3d& p_m) const;
 
  private:
   using Triangle = std::array<Vec3d, 3>;
   struct Node {
-    Vec3d centre;            ///< of area
-    double reach_squared{};  ///< beyond this distance from the centre the expansion is used
+    Vec3d centre;             ///< of area
+    double radius_squared{};  ///< of the sphere round it that holds the triangles
     /// Integrals of the normal n times powers of d = x - centre over the triangles. The derivatives of 1/r
     /// they are multiplied with are symmetric, so only the symmetric sums are kept.
     Vec3d zeroth;                     ///< of n
@@ -38,6 +41,8 @@ class WindingTree {
 
   std::uint32_t build(std::uint32_t begin, std::uint32_t end);
   void expand(Node& node) const;
+  /// With nodes expanded beyond so many of their radii.
+  double at(const Vec3d& p_m, double far_radii) const;
 
   Vec3d origin_m_;
   double per_m_ = 1;  ///< the tree works in a unit box, so that no power of a length over- or underflows

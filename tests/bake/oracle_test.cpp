@@ -153,6 +153,28 @@ TEST(Oracle, WindingNumberErrorIsBelowOneHundredth) {
   }
 }
 
+TEST(Oracle, RoundedWindingNumberIsTheNearestIntegerOfTheSum) {
+  const Mesh torus = test::torus(2, 0.5, 48, 24);
+  Mesh half = torus;  // open
+  half.faces.resize(half.faces.size() / 2);
+  const Mesh overlapping =
+      test::joined({torus, test::box({1, 1, 1}, {2, 0, 0}), test::sphere(0.8, 3, {2, 0, 0})});
+  for (const Mesh& mesh : {torus, half, overlapping}) {
+    const Oracle oracle(mesh);
+    Random random(15);
+    std::size_t wrong = 0, not_zero = 0;
+    for (int i = 0; i < 3000; ++i) {
+      const Vec3d p{random.in(-3, 3), random.in(-3, 3), random.in(-0.6, 0.6)};
+      const double winding = winding_by_dihedral_angles(mesh, p);
+      if (std::abs(winding - std::floor(winding) - 0.5) < 0.01) continue;
+      wrong += oracle.rounded_winding_number(p) != std::lround(winding);
+      not_zero += std::lround(winding) != 0;
+    }
+    EXPECT_EQ(wrong, 0U);
+    EXPECT_GT(not_zero, 150U);
+  }
+}
+
 TEST(Oracle, KnowingABoundOfTheDistanceChangesNoAnswer) {
   const Oracle oracle(test::torus(2, 0.5, 32, 16));
   Random random(14);

@@ -35,6 +35,8 @@ class Oracle {
   /// Evaluated hierarchically (second-order expansion per tree node) with error below 0.01 away from the
   /// surface.
   double winding_number(const Vec3d& p_m) const;
+  /// The nearest integer. 0 where p is not finite.
+  int rounded_winding_number(const Vec3d& p_m) const;
   /// True where the winding number exceeds 1/2.
   bool inside(const Vec3d& p_m) const;
   /// Negative inside [m].
