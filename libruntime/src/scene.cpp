@@ -32,8 +32,9 @@ struct Body {
   std::vector<Stage> stages;  ///< effects on contacts, with a memory for this body
   std::vector<Contact> contacts;
   std::size_t contact_count{};
-  Vec3d probe_m{};    ///< where the probe's origin is in this frame, own frame
-  bool is_reached{};  ///< by the probe's ball in this frame
+  Vec3d probe_m{};     ///< where the probe's origin is in this frame, own frame
+  bool is_reached{};   ///< by the probe's ball in this frame
+  bool was_touched{};  ///< in the frame before
 };
 
 /// A double rounded to float may fall short of itself by less than this.
@@ -206,7 +207,7 @@ std::uint32_t Scene::Impl::count_inside(const Body& body, const Pose& body_from_
 
 void Scene::Impl::touch(Body& body, const BodyState& state, FrameResult& result) noexcept {
   Field field{&*body.scaled, query};
-  const Found found = find_touches(field, state, body.contacts);
+  const Found found = body.is_reached ? find_touches(field, state, body.contacts) : Found{};
   // What effects ask besides must not be deeper than what was afforded.
   const Layer asked = query.layer == Layer::kAuto ? Layer::kThree : query.layer;
   if (state.budget != nullptr && state.budget->layer < asked) field.options.layer = state.budget->layer;
@@ -235,6 +236,7 @@ void Scene::Impl::touch(Body& body, const BodyState& state, FrameResult& result)
 std::size_t Scene::Impl::reach(const Pose& world_from_probe) noexcept {
   std::size_t count = 0;
   for (Body& body : bodies) {
+    body.was_touched = body.contact_count > 0;
     body.contact_count = 0;
     body.probe_m = body.world_from_body.apply_inverse(world_from_probe.translation_m - body.translation_m);
     body.is_reached =
@@ -255,24 +257,26 @@ FrameResult Scene::Impl::frame(const Pose& world_from_probe, const Vec3d& about_
     budget->layer = Layer::kAuto;
   }
   for (Body& body : bodies) {
-    if (!finite || !body.is_reached) continue;
+    // The effects of a body that was left at one leap must learn that its contacts have ended.
+    if (!finite || !(body.is_reached || body.was_touched)) continue;
     const Pose body_from_probe{relative(body.orientation, world_from_probe.orientation), body.probe_m};
     if (objects.empty()) {
       result.inside += count_inside(body, body_from_probe, result.wrench.is_finite);
       result.layer = Layer::kOne;
       continue;
     }
+    WorkBudget* const shared = body.is_reached ? budget : nullptr;
     WorkBudget share;
-    if (budget != nullptr) share.units = (budget->units - std::min(budget->spent, budget->units)) / left--;
+    if (shared != nullptr) share.units = (budget->units - std::min(budget->spent, budget->units)) / left--;
     BodyState state;
     state.weight_m2 = probe.weight_m2;
     state.about_m = cast<float>(body.world_from_body.apply_inverse(about_m - body.translation_m));
     state.step_s = step_s;
     state.body = &*blocks;
     state.at = {body_from_probe};
-    state.budget = budget != nullptr ? &share : nullptr;
+    state.budget = shared != nullptr ? &share : nullptr;
     touch(body, state, result);
-    if (budget == nullptr) continue;
+    if (shared == nullptr) continue;
     budget->spent += share.spent;
     budget->level = share.level;
     if (budget->layer == Layer::kAuto || share.layer < budget->layer) budget->layer = share.layer;

@@ -194,6 +194,21 @@ TEST(Scene, WhatIsNotNamedIsNotStored) {
   EXPECT_GT(bytes(all_effects()), plain + 56000);
 }
 
+// A ball's surface is that of its bounding sphere: who leaves the one is out of reach of the other.
+TEST(Scene, ABodyLeftAtOneLeapIsForgottenByItsEffects) {
+  Scene scene = built({{&ball_asset(), {}}}, {{{0, 0, 0}}}, with({{"reaction", {}}, {"friction", {}}}));
+  const auto force_n = [&](double turn, double radius_m) {
+    const Vec3d n{std::cos(turn), std::sin(turn), 0};
+    const Vec3f force = scene.frame(at(test::kBallCentre_m + radius_m * n), {}, 1e-3F).wrench.force_n;
+    return cast<double>(force) - dot(cast<double>(force), n) * n;
+  };
+  force_n(0, 0.75);
+  const double held = norm(force_n(0.01, 0.75));
+  EXPECT_GT(held, 5) << "dragged along the surface";
+  force_n(0.02, 30);
+  EXPECT_LT(norm(force_n(0.5, 0.75)), 0.2 * held) << "a new contact has no bristle yet";
+}
+
 TEST(Scene, FirstLayerReadsNoMap) {
   Asset bare = ball_asset();
   for (Part& part : bare.parts) part.map = {};
