@@ -9,6 +9,7 @@
 #include "sqmap/runtime/effects/force_model.hpp"
 #include "sqmap/runtime/effects/friction.hpp"
 #include "sqmap/runtime/effects/impact_zones.hpp"
+#include "sqmap/runtime/effects/passivity.hpp"
 #include "sqmap/runtime/effects/reaction.hpp"
 #include "sqmap/runtime/effects/slew_limit.hpp"
 #include "sqmap/runtime/effects/smoothing.hpp"
@@ -92,10 +93,15 @@ constexpr Row row(std::string_view needs = {}) {
 /// In the order in which a frame runs them: contacts are corrected before forces are taken from them, and the
 /// total is limited last.
 constexpr Row kRows[] = {
-    row<Smoothing>(),           row<Tracking>(),
-    row<Texture>("reaction"),   row<Reaction>(),
-    row<Friction>("reaction"),  row<ImpactZones>("reaction"),
-    row<Torque>("reaction"),    row<ForceLimit>("reaction"),
+    row<Smoothing>(),
+    row<Tracking>(),
+    row<Texture>("reaction"),
+    row<Reaction>(),
+    row<Friction>("reaction"),
+    row<ImpactZones>("reaction"),
+    row<Passivity>("reaction"),
+    row<Torque>("reaction"),
+    row<ForceLimit>("reaction"),
     row<SlewLimit>("reaction"),
 };
 

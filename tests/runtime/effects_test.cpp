@@ -10,6 +10,7 @@
 #include "sqmap/runtime/effects/force_model.hpp"
 #include "sqmap/runtime/effects/friction.hpp"
 #include "sqmap/runtime/effects/impact_zones.hpp"
+#include "sqmap/runtime/effects/passivity.hpp"
 #include "sqmap/runtime/effects/reaction.hpp"
 #include "sqmap/runtime/effects/slew_limit.hpp"
 #include "sqmap/runtime/effects/smoothing.hpp"
@@ -350,7 +351,7 @@ TEST(ForceModel, RefusesParametersOutOfRangeByName) {
 
 auto everything(std::size_t points) {
   return model_for(points, Smoothing{}, Tracking{}, Texture{}, Reaction{}, friction(0.4F, 1000),
-                   ImpactZones{}, Torque{}, ForceLimit{}, SlewLimit{});
+                   ImpactZones{}, Passivity{}, Torque{}, ForceLimit{}, SlewLimit{});
 }
 
 TEST(ForceModel, AnyFiniteContactGivesAFiniteForce) {

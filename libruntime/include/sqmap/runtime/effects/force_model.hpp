@@ -30,7 +30,8 @@ concept RemembersPoints = requires(E e) {
 
 /// A force model composed at compile time: the effects run in the order they are written, which should be
 ///
-///     Smoothing, Tracking, Texture, Reaction, Friction, ImpactZones, Torque, ForceLimit, SlewLimit
+///     Smoothing, Tracking, Texture, Reaction, Friction, ImpactZones, Passivity, Torque, ForceLimit,
+///     SlewLimit
 ///
 /// less what is not wanted. What is not named is not computed, not stored and not linked.
 ///
