@@ -3,6 +3,7 @@
 import os
 import re
 import subprocess
+import time
 import unittest
 from pathlib import Path
 
@@ -35,6 +36,19 @@ class LoadTest(FolderTest):
         self.assertEqual((code, rows), (0, [(1, 0, 0, 0), (2, 0, 0, 0)]), text)
         for run, count in (("j1", 1), ("j2", 2)):
             self.assertEqual(len(list((kept / run).iterdir())), count)
+
+    def test_a_stop_ends_the_baker_and_removes_what_was_written(self):
+        (self.folder / "tmp").mkdir()
+        (self.folder / "sqbake").write_text(f'#!/bin/sh\ntouch {self.folder}/begun\nexec sleep 100\n', encoding="utf-8")
+        (self.folder / "sqbake").chmod(0o755)
+        mesh = write_off(self.folder / "box.off", box())
+        with subprocess.Popen([LOAD_TEST, "2", "--meshes", mesh, "--bin", self.folder], stdout=subprocess.DEVNULL,
+                              stderr=subprocess.DEVNULL, env={**os.environ, "TMPDIR": str(self.folder / "tmp")}) as test:
+            while not (self.folder / "begun").exists():
+                time.sleep(0.05)
+            test.terminate()
+            self.assertEqual(test.wait(TIMEOUT_S), 143)
+        self.assertEqual(list((self.folder / "tmp").iterdir()), [])
 
     def test_what_is_left_over_or_not_baked_is_counted(self):
         for trick, row in (("sleep 100 >/dev/null 2>&1 &", (1, 0, 0)),
