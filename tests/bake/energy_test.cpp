@@ -21,7 +21,7 @@ Asset baked(const Mesh& mesh) {
 }
 
 struct Gain {
-  double most = 0, mean_last = 0;
+  double most = 0, most_of_probe = 0, mean_last = 0;
   int contacts = 0;
 };
 
@@ -44,6 +44,7 @@ Gain press_all_over(const Asset& asset, const std::vector<runtime::EffectChoice>
     const test::Energy energy =
         test::press(scene.value(), how, place.point_m, place.normal, test::across(place.normal));
     gain.most = std::max(gain.most, energy.most);
+    gain.most_of_probe = std::max(gain.most_of_probe, energy.most_of_probe);
     gain.mean_last += energy.last / static_cast<double>(kPlaces);
     gain.contacts += energy.contacts;
   }
@@ -70,6 +71,16 @@ TEST(Energy, OnABakedLWithSharpEdgesFrictionTakesMoreThanTheEdgesGive) {
     const Gain gain = press_all_over(asset, effects);
     EXPECT_LT(gain.most, 1.25) << (has_tracking ? "with tracking" : "without tracking");
     EXPECT_LT(gain.mean_last, 0.95) << (has_tracking ? "with tracking" : "without tracking");
+  }
+}
+
+TEST(Energy, OnABakedLWithSharpEdgesPassivityLeavesNoGainThatTheReactionAloneHas) {
+  const Asset asset = baked(test::l_shape(2, 0.5));
+  EXPECT_GT(press_all_over(asset, {kReaction}).most_of_probe, 1.2);
+  for (const bool has_tracking : {false, true}) {
+    std::vector<runtime::EffectChoice> effects{kReaction, {"passivity", {}}};
+    if (has_tracking) effects.push_back({"tracking", {}});
+    EXPECT_LT(press_all_over(asset, effects).most_of_probe, 1.01) << (has_tracking ? "tracked" : "");
   }
 }
 

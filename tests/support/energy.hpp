@@ -29,9 +29,10 @@ struct Press {
   double aside_m = 0.02;  ///< and how far to the side
 };
 
-/// The largest energy ever and the last, as shares of the energy at the start.
+/// The largest energy ever and the last, as shares of the energy at the start. `most_of_probe` is that of the
+/// mass and its spring alone, without what the reaction would store at the contact's depth.
 struct Energy {
-  double most{}, last{};
+  double most{}, last{}, most_of_probe{};
   int contacts{};
 };
 
@@ -43,10 +44,9 @@ inline Energy press(runtime::Scene& scene, const Press& how, const Vec3d& surfac
                     const Vec3d& aside) {
   const Vec3d handle_m = surface_m - how.below_m * normal;
   Vec3d p = surface_m + how.above_m * normal + how.aside_m * aside, v;
-  const auto energy = [&](const Vec3d& velocity, double depth_m) {
+  const auto of_probe = [&](const Vec3d& velocity) {
     return 0.5 * how.mass_kg * dot(velocity, velocity) +
-           0.5 * how.coupling_n_per_m * dot(handle_m - p, handle_m - p) +
-           0.5 * how.stiffness_n_per_m * depth_m * depth_m;
+           0.5 * how.coupling_n_per_m * dot(handle_m - p, handle_m - p);
   };
   Energy result;
   double start = 0;
@@ -57,9 +57,12 @@ inline Energy press(runtime::Scene& scene, const Press& how, const Vec3d& surfac
                           how.damping_n_s_per_m * v;
     const Vec3d after = v + (how.step_s / how.mass_kg) * force_n;
     const double depth_m = touching.empty() ? 0 : touching[0].depth_m;
-    if (frame == 0) start = energy(v, depth_m);
-    result.last = energy(frame == 0 ? v : 0.5 * (v + after), depth_m) / start;
+    const double of_contact = 0.5 * how.stiffness_n_per_m * depth_m * depth_m;
+    if (frame == 0) start = of_probe(v) + of_contact;
+    const double probe = of_probe(frame == 0 ? v : 0.5 * (v + after));
+    result.last = (probe + of_contact) / start;
     result.most = std::max(result.most, result.last);
+    result.most_of_probe = std::max(result.most_of_probe, probe / start);
     result.contacts += touching.empty() ? 0 : 1;
     v = after;
     p = p + how.step_s * v;
