@@ -135,4 +135,14 @@ std::string message_for(std::string_view file, const Error& error) {
   return message;
 }
 
+Exit refuse(Console& console, const Error& error) {
+  console.error(error.remedy.empty() ? error.finding : error.finding + "; " + error.remedy);
+  return exit_for(error.status);
+}
+
+Exit refuse(Console& console, std::string_view file, const Error& error) {
+  console.error(message_for(file, error));
+  return exit_for(error.status);
+}
+
 }  // namespace sqmap::apps

@@ -59,4 +59,9 @@ class Console {
 /// `FILE: finding; remedy`. The file is left out where the finding already names it.
 std::string message_for(std::string_view file, const Error& error);
 
+/// Prints an error as `finding; remedy`, where a file is given as message_for() does. The exit code that
+/// tells of it.
+Exit refuse(Console& console, const Error& error);
+Exit refuse(Console& console, std::string_view file, const Error& error);
+
 }  // namespace sqmap::apps

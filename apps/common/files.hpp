@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "sqmap/asset/result.hpp"
@@ -16,6 +17,11 @@ Result<std::vector<std::uint8_t>> read_file(const std::filesystem::path& path, s
 
 /// All of standard input, at most `max_bytes`. Errors: kFileUnreadable.
 Result<std::vector<std::uint8_t>> read_stdin(std::uint64_t max_bytes);
+
+/// The same bytes, as text.
+inline std::string_view as_text(std::span<const std::uint8_t> bytes) noexcept {
+  return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
+}
 
 /// Writes to an open file, however many calls it takes. 0 or errno.
 int write_all(int fd, std::span<const std::uint8_t> bytes);

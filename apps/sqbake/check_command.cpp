@@ -55,18 +55,14 @@ std::string text_report(const std::string& input, const bake::SourceMesh& source
 
 Exit run_check(Console& console, const CheckArguments& arguments) {
   const std::string input = arguments.input.string();
-  const auto refuse = [&](const Error& error) {
-    console.error(message_for(input, error));
-    return exit_for(error.status);
-  };
   const Result<AssetOptions> options = options_from(arguments.settings);
-  if (!options) return refuse(options.error());
+  if (!options) return refuse(console, input, options.error());
   const Result<bake::SourceMesh> source = bake::read_mesh(arguments.input, options.value().bake.read);
-  if (!source) return refuse(source.error());
+  if (!source) return refuse(console, input, source.error());
   if (const auto warning = size_warning(source.value().mesh)) console.warning(input + ": " + *warning);
   const Result<bake::PreparedMesh> prepared =
       bake::check_and_repair(source.value(), options.value().bake.repair);
-  if (!prepared) return refuse(prepared.error());
+  if (!prepared) return refuse(console, input, prepared.error());
   const MeshRecord& record = prepared.value().record;
   if (arguments.format == "text") {
     console.out(text_report(input, source.value(), record));

@@ -62,7 +62,7 @@ std::vector<std::string> buffer_files(const fs::path& mesh, bool is_binary) {
   std::vector<std::string> names;
   const auto bytes = read_file(mesh, kLargestScene_bytes);
   if (!bytes) return names;
-  const std::string_view all(reinterpret_cast<const char*>(bytes.value().data()), bytes.value().size());
+  const std::string_view all = as_text(bytes.value());
   const Json scene = Json::parse(scene_json(all, is_binary), nullptr, false);
   if (!scene.is_object() || !scene.contains("buffers") || !scene["buffers"].is_array()) return names;
   for (const Json& buffer : scene["buffers"]) {

@@ -133,7 +133,7 @@ Outcome Lister::add_list(std::string_view name) {
   const auto bytes = is_stdin ? read_stdin(kLargestList_bytes) : read_file(path, kLargestList_bytes);
   if (!bytes) return bytes.error();
   if (!is_stdin) list.lists.push_back(path);
-  const std::string_view text(reinterpret_cast<const char*>(bytes.value().data()), bytes.value().size());
+  const std::string_view text = as_text(bytes.value());
   const fs::path base = is_beside && !is_stdin ? path.parent_path() : fs::path();
   for (std::size_t at = 0, number = 1; at < text.size(); ++number) {
     const std::size_t end = std::min(text.find('\n', at), text.size());

@@ -33,8 +33,7 @@ Result<toml::table> parse(const fs::path& path) {
   const Result<std::vector<std::uint8_t>> bytes = read_file(path, kLargestFile_bytes);
   if (!bytes) return bytes.error();
   try {
-    return toml::parse(
-        std::string_view(reinterpret_cast<const char*>(bytes.value().data()), bytes.value().size()));
+    return toml::parse(as_text(bytes.value()));
   } catch (const toml::parse_error& error) {
     return Error{Status::kBadOption,
                  fmt::format("{}:{}: {}", path.string(), error.source().begin.line, error.description()),

@@ -73,8 +73,7 @@ Exit run_query(Console& console, const QueryArguments& arguments) {
   const Result<std::vector<std::uint8_t>> bytes =
       is_stdin ? read_stdin(kMaxPointBytes) : read_file(arguments.points, kMaxPointBytes);
   if (!bytes) return report(console, name, bytes.error());
-  const Result<std::vector<Vec3f>> points =
-      parse_points({reinterpret_cast<const char*>(bytes.value().data()), bytes.value().size()});
+  const Result<std::vector<Vec3f>> points = parse_points(as_text(bytes.value()));
   if (!points) return report(console, name, points.error());
 
   constexpr std::size_t kFlushBytes = 1 << 16;

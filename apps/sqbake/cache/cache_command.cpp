@@ -40,10 +40,7 @@ Json header(const CacheStore& store, const char* type) {
 
 Exit print_stats(Console& console, const CacheStore& store, const CacheArguments& arguments) {
   const Result<CacheStatistics> taken = cache_statistics(store);
-  if (!taken) {
-    console.error(message_for(store.folder().string(), taken.error()));
-    return exit_for(taken.error().status);
-  }
+  if (!taken) return refuse(console, store.folder().string(), taken.error());
   const CacheStatistics& statistics = taken.value();
   if (arguments.format == "json") {
     Json json = header(store, "stats");
@@ -71,10 +68,7 @@ Exit print_stats(Console& console, const CacheStore& store, const CacheArguments
 
 Exit print_verification(Console& console, const CacheStore& store, const CacheArguments& arguments) {
   const Result<CacheVerification> taken = verify_cache(store);
-  if (!taken) {
-    console.error(message_for(store.folder().string(), taken.error()));
-    return exit_for(taken.error().status);
-  }
+  if (!taken) return refuse(console, store.folder().string(), taken.error());
   const CacheVerification& verification = taken.value();
   if (arguments.format == "json") {
     Json json = header(store, "verify");
@@ -92,10 +86,7 @@ Exit print_verification(Console& console, const CacheStore& store, const CacheAr
 
 Exit print_collection(Console& console, const CacheStore& store, const CacheArguments& arguments) {
   const Result<CacheCollection> taken = collect_cache(store, arguments.limits);
-  if (!taken) {
-    console.error(message_for(store.folder().string(), taken.error()));
-    return exit_for(taken.error().status);
-  }
+  if (!taken) return refuse(console, store.folder().string(), taken.error());
   const CacheCollection& collection = taken.value();
   if (arguments.format == "json") {
     Json json = header(store, "gc");
