@@ -16,7 +16,7 @@ constexpr std::array<std::pair<Exit, const char*>, 14> kMeanings{{
     {Exit::kFileAccess, "a file is missing or cannot be read or written"},
     {Exit::kBadInput, "the input file is not usable (mesh, bundle or points)"},
     {Exit::kInternal, "the bake failed, or an internal error"},
-    {Exit::kUnsupportedVersion, "the bundle's version is not supported"},
+    {Exit::kUnsupportedVersion, "the version of the bundle or of the records is not supported"},
     {Exit::kDifferent, "diff: the bundles differ"},
     {Exit::kLimit, "bake: one mesh, which ran into --timeout or --memory"},
     {Exit::kCrashed, "bake: one mesh, on which the baker crashed"},

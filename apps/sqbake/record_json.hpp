@@ -7,11 +7,10 @@
 
 #include "sqmap/asset/result.hpp"
 
+#include "bake_schema.hpp"
 #include "records.hpp"
 
 namespace sqmap::apps {
-
-inline constexpr const char* kBakeSchema = "sqmap.bake/2";
 
 /// One object on one line with its line feed.
 std::string record_line(const BakeRecord& record);

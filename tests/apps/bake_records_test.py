@@ -13,7 +13,32 @@ import jsonschema
 import support
 from support import ROUGH, TIMEOUT_S, FolderTest, box, command, sphere, write_off
 
-SCHEMA = json.loads((Path(os.environ["SQMAP_SOURCE_DIR"]) / "apps/sqbake/bake.schema.json").read_text(encoding="utf-8"))
+SOURCE = Path(os.environ["SQMAP_SOURCE_DIR"])
+
+
+def read_schema(name):
+    return json.loads((SOURCE / "apps/sqbake" / name).read_text(encoding="utf-8"))
+
+
+def closed(schema):
+    """The same, but for fields that it does not name: users shall pass over them, sqbake shall print none."""
+    if isinstance(schema, list):
+        return [closed(item) for item in schema]
+    if not isinstance(schema, dict):
+        return schema
+    more = {"additionalProperties": False} if "properties" in schema and schema.get("type") == "object" else {}
+    return {**{name: closed(value) for name, value in schema.items()}, **more}
+
+
+def more_fields(json_value):
+    if isinstance(json_value, list):
+        return [more_fields(item) for item in json_value]
+    if not isinstance(json_value, dict) or ("schema" not in json_value and set(json_value) & {"unit", "ok"}):
+        return json_value  # settings and counts of outcomes: their names are no fields
+    return {**{name: more_fields(value) for name, value in json_value.items()}, "added later": 1}
+
+
+SCHEMA = read_schema("bake.schema.json")
 
 
 def run(*arguments):
@@ -24,7 +49,7 @@ class Records(FolderTest):
     def setUp(self):
         super().setUp()
         jsonschema.Draft7Validator.check_schema(SCHEMA)
-        self.validator = jsonschema.Draft7Validator(SCHEMA)
+        self.validator = jsonschema.Draft7Validator(closed(SCHEMA))
         self.models = self.folder / "models"
         self.models.mkdir()
         write_off(self.models / "ball.off", sphere(1))
@@ -111,13 +136,27 @@ class Records(FolderTest):
         self.assertFalse(json.loads(result.stdout.splitlines()[0])["cached"])
 
 
+class Versions(unittest.TestCase):
+    def test_what_this_version_once_printed_keeps_to_its_schema_and_so_does_what_has_more_fields(self):
+        """A field that becomes required, goes or is renamed breaks one who wrote for this version: it needs another."""
+        schemas = {schema["$id"]: schema for schema in map(read_schema, ("bake.schema.json", "tools.schema.json"))}
+        lines = (SOURCE / "tests/apps/kept_records.ndjson").read_text(encoding="utf-8").splitlines()
+        kinds = set()
+        for line in map(json.loads, lines):
+            schema = schemas[line["of"]]
+            kinds.add(line["record"]["schema"])
+            jsonschema.Draft7Validator(schema).validate(line["record"])
+            jsonschema.Draft7Validator(schema).validate(more_fields(line["record"]))
+        declared = set(re.findall(r'"const": "(sqmap[^"]*)"', json.dumps(list(schemas.values()))))
+        self.assertEqual(kinds, declared, "a version without kept records, or kept records of another version")
+
+
 class Tools(FolderTest):
     def test_what_the_other_commands_print_keeps_to_their_schema(self):
-        folder = Path(os.environ["SQMAP_SOURCE_DIR"]) / "apps" / "sqbake"
-        schema = json.loads((folder / "tools.schema.json").read_text(encoding="utf-8"))
+        schema = read_schema("tools.schema.json")
         self.assertEqual(schema["definitions"]["mesh"], SCHEMA["definitions"]["mesh"])
         jsonschema.Draft7Validator.check_schema(schema)
-        validator = jsonschema.Draft7Validator(schema)
+        validator = jsonschema.Draft7Validator(closed(schema))
         ball, cache = write_off(self.folder / "ball.off", sphere(0)), self.folder / "cache"
         write_off(self.folder / "open.off", (box()[0], box()[1][2:]))
         baked = run("sqbake", "bake", ball, *ROUGH, "-o", self.folder / "ball.h5", "--cache", cache, "--format", "ndjson")

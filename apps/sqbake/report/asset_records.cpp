@@ -1,8 +1,15 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "asset_records.hpp"
 
+#include <charconv>
+#include <optional>
+#include <system_error>
+
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
+
+#include "../../common/files.hpp"
+#include "../bake_schema.hpp"
 
 namespace sqmap::apps {
 namespace {
@@ -23,6 +30,13 @@ std::string text(const Json& json, const char* name) {
 double number(const Json& json, const char* name) {
   const Json& value = member(json, name);
   return value.is_number() ? value.get<double>() : std::numeric_limits<double>::quiet_NaN();
+}
+
+std::optional<unsigned> number_behind(std::string_view prefix, std::string_view text) {
+  text.remove_prefix(prefix.size());
+  unsigned value = 0;
+  const auto [end, problem] = std::from_chars(text.data(), text.data() + text.size(), value);
+  return problem == std::errc() && end == text.data() + text.size() ? std::optional(value) : std::nullopt;
 }
 
 std::uint64_t count(const Json& json, const char* name) {
@@ -79,7 +93,14 @@ Result<AssetRecords> parse_asset_records(std::string_view all, std::string_view 
                                number_of_line),
                    "give what `sqbake bake --format ndjson` wrote"};
     result.has_summary = text(json, "type") == "summary";
-    if (!schema.starts_with("sqmap.bake/") || text(json, "type") != "asset") continue;
+    if (!schema.starts_with(kBakeSchemaName)) continue;
+    if (const std::optional<unsigned> version = number_behind(kBakeSchemaName, schema);
+        !version || *version > kBakeSchemaVersion)
+      return Error{Status::kUnsupportedVersion,
+                   fmt::format("{}:{}: a record of {}, this sqbake knows versions up to {}", source,
+                               number_of_line, schema, kBakeSchemaVersion),
+                   "use the sqbake that wrote it, or a newer one"};
+    if (text(json, "type") != "asset") continue;
     AssetRecord record = record_of(json, line);
     if (record.input.empty() || record.output.empty() || record.outcome.empty())
       return Error{Status::kInvalidAsset,
@@ -89,6 +110,13 @@ Result<AssetRecords> parse_asset_records(std::string_view all, std::string_view 
     result.records.push_back(std::move(record));
   }
   return result;
+}
+
+Result<AssetRecords> read_asset_records(const std::filesystem::path& file) {
+  const Result<std::vector<std::uint8_t>> bytes =
+      file == "-" ? read_stdin(kLargestRecords_bytes) : read_file(file, kLargestRecords_bytes);
+  if (!bytes) return bytes.error();
+  return parse_asset_records(as_text(bytes.value()), file.string());
 }
 
 }  // namespace sqmap::apps

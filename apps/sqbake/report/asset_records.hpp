@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <filesystem>
 #include <limits>
 #include <string>
 #include <string_view>
@@ -37,7 +38,15 @@ struct AssetRecords {
 };
 
 /// The asset records of an NDJSON text; other records (summaries) are passed over. `source` names it in
-/// errors. Errors: kInvalidAsset with the number of the line.
+/// errors. Errors: kInvalidAsset or, for records of a later version, kUnsupportedVersion, with the number of
+/// the line.
 Result<AssetRecords> parse_asset_records(std::string_view text, std::string_view source);
+
+/// Room for the records of some 500,000 meshes.
+inline constexpr std::uint64_t kLargestRecords_bytes = std::uint64_t{1} << 30;
+
+/// Those of a file; "-" is standard input. Errors: kFileMissing, kFileUnreadable, kInvalidAsset,
+/// kUnsupportedVersion.
+Result<AssetRecords> read_asset_records(const std::filesystem::path& file);
 
 }  // namespace sqmap::apps
