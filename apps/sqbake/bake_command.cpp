@@ -81,18 +81,26 @@ Outcome write_run_report(const BakeArguments& arguments, std::string_view record
 /// Leaves the share that was asked for; where none was, and the meshes were searched for, that of the job
 /// array. Who named a mesh in a task of an array has dealt the meshes out already.
 Outcome take_shard(Console& console, const BakeArguments& arguments, JobList& list) {
+  const auto leave_shard = [&](const Shard& shard) -> Outcome {
+    const Result<std::vector<std::uint64_t>> costs = costs_of(console, list, arguments.costs);
+    if (!costs) return costs.error();
+    keep_shard(list, costs.value(), shard);
+    return Done{};
+  };
   if (!arguments.shard.empty()) {
     const Result<Shard> shard = parse_shard(arguments.shard);
     if (!shard) return shard.error();
-    keep_shard(list, shard.value());
-    return Done{};
+    return leave_shard(shard.value());
   }
-  if (!list.is_searched) return Done{};
-  const Result<std::optional<Shard>> shard = shard_of_job_array();
+  const Result<std::optional<Shard>> shard =
+      list.is_searched ? shard_of_job_array() : Result<std::optional<Shard>>(std::nullopt);
   if (!shard) return shard.error();
+  if (!shard.value() && !arguments.costs.empty())
+    return Error{Status::kBadOption, "--costs decides which mesh is in which shard, and there is none",
+                 "add --shard I/N"};
   if (!shard.value() || shard.value()->count == 1) return Done{};
   const std::size_t all = list.jobs.size();
-  keep_shard(list, *shard.value());
+  if (const Outcome ok = leave_shard(*shard.value()); !ok) return ok.error();
   console.insist(
       fmt::format("a task of a job array: bakes --shard {}/{}, {} of {} meshes; --shard 1/1 bakes all",
                   shard.value()->index + 1, shard.value()->count, list.jobs.size(), all));
@@ -100,23 +108,23 @@ Outcome take_shard(Console& console, const BakeArguments& arguments, JobList& li
 }
 
 Exit run_bake(Console& console, const BakeArguments& arguments) {
-  const auto refuse = [&](const Error& error) {
-    console.error(error.remedy.empty() ? error.finding : error.finding + "; " + error.remedy);
-    return exit_for(error.status);
-  };
   console.set_quiet(arguments.quiet);
-  if (const auto ok = options_from(arguments.request.config.command_line); !ok) return refuse(ok.error());
-  if (const Outcome ok = check_limits(arguments); !ok) return refuse(ok.error());
+  if (const auto ok = options_from(arguments.request.config.command_line); !ok)
+    return refuse(console, ok.error());
+  if (const Outcome ok = check_limits(arguments); !ok) return refuse(console, ok.error());
   Result<JobList> list = list_jobs(arguments.request);
-  if (!list) return refuse(list.error());
-  if (const Outcome ok = take_shard(console, arguments, list.value()); !ok) return refuse(ok.error());
-  if (const Outcome ok = check_side_outputs(arguments, list.value()); !ok) return refuse(ok.error());
-  if (const Outcome ok = check_folders(list.value(), arguments.request); !ok) return refuse(ok.error());
+  if (!list) return refuse(console, list.error());
+  if (const Outcome ok = take_shard(console, arguments, list.value()); !ok)
+    return refuse(console, ok.error());
+  if (const Outcome ok = check_side_outputs(arguments, list.value()); !ok) return refuse(console, ok.error());
+  if (const Outcome ok = check_folders(list.value(), arguments.request); !ok)
+    return refuse(console, ok.error());
   if (arguments.dry_run) {
     print_plan(console, list.value(), arguments);
     return Exit::kOk;
   }
-  if (const Outcome ok = prepare_folders(list.value(), arguments.request); !ok) return refuse(ok.error());
+  if (const Outcome ok = prepare_folders(list.value(), arguments.request); !ok)
+    return refuse(console, ok.error());
   install_stop_signals();
   const std::vector<Job> jobs = arguments.depfile.empty() ? std::vector<Job>() : list.value().jobs;
   BakeRun bake_run(console, arguments, std::move(list).value());
@@ -125,12 +133,12 @@ Exit run_bake(Console& console, const BakeArguments& arguments) {
     const Outcome ok = write_run_report(arguments, bake_run.record_lines());
     if (stop_signal() != 0) return static_cast<Exit>(128 + stop_signal());
     if (!ok) {
-      const Exit refused = refuse(ok.error());
+      const Exit refused = refuse(console, ok.error());
       if (code == Exit::kOk) return refused;
     }
   }
   if (code == Exit::kOk && !arguments.depfile.empty())
-    if (const Outcome ok = write_depfile(arguments.depfile, jobs); !ok) return refuse(ok.error());
+    if (const Outcome ok = write_depfile(arguments.depfile, jobs); !ok) return refuse(console, ok.error());
   return code;
 }
 
@@ -140,7 +148,8 @@ constexpr const char* kDescription =
     "bundle per mesh. A folder stands for the meshes in it (off obj ply stl gltf glb dae fbx 3mf), a pattern "
     "in\n"
     "quotes for those that match (* ? [a-z], ** for any folders), @LIST for the inputs in a file, one a "
-    "line.\n"
+    "line\n"
+    "(@@LIST: paths from the list's folder; @-: standard input).\n"
     "Each mesh is baked in a process of its own: one that fails, hangs or crashes does not stop the others.\n"
     "\n"
     "Examples:\n"
@@ -179,6 +188,9 @@ void add_run_options(CLI::App& app, BakeArguments& arguments) {
                  "auto: as the job array of Slurm or Kubernetes says, which is also the default for\n"
                  "what a folder, a pattern, a list or a manifest names; 1/1: all")
       ->type_name("I/N");
+  app.add_option("--costs", arguments.costs,
+                 "With --shard: records of an earlier bake, as of `sqbake plan`; the same in every shard")
+      ->type_name("FILE.ndjson");
   app.add_flag("--fail-fast", arguments.fail_fast, "Begin no further mesh once one has failed");
   app.add_flag("--strict", arguments.strict, "A degraded bundle makes the run fail");
   app.add_flag("--verify-determinism", arguments.verify_determinism,

@@ -34,6 +34,7 @@ struct BakeArguments {
   std::filesystem::path depfile;
   std::filesystem::path report;  ///< HTML page to write; empty: none
   std::string shard;             ///< as parse_shard() takes it; empty: bake all
+  std::filesystem::path costs;   ///< records that tell what meshes took, for shards; empty: sizes count
   std::filesystem::path cache;   ///< folder of the cache; empty: the default one
   bool use_cache = true;
   bool explain = false;  ///< say why each mesh is baked, or is not

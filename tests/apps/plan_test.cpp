@@ -8,6 +8,7 @@
 
 #include <gtest/gtest.h>
 
+#include "../../apps/sqbake/plan/costs.hpp"
 #include "../../apps/sqbake/plan/merge.hpp"
 #include "../../apps/sqbake/plan/shards.hpp"
 
@@ -23,7 +24,7 @@ std::vector<WorkItem> random_items(std::mt19937_64& random, std::size_t count) {
 
 std::uint64_t heaviest(const std::vector<WorkItem>& items, const std::vector<std::uint32_t>& shard_of) {
   std::map<std::uint32_t, std::uint64_t> load;
-  for (std::size_t k = 0; k < items.size(); ++k) load[shard_of[k]] += estimated_cost(items[k].bytes);
+  for (std::size_t k = 0; k < items.size(); ++k) load[shard_of[k]] += items[k].cost;
   return std::ranges::max_element(load, {}, [](const auto& entry) { return entry.second; })->second;
 }
 
@@ -47,10 +48,10 @@ TEST(Shards, AreWithinGrahamsBoundOfTheBestOfAllDeals) {
   EXPECT_GT(better_than_in_turn, 20);
 }
 
-TEST(Shards, DependOnNamesAndSizesNotOnTheOrder) {
+TEST(Shards, DependOnNamesAndCostsNotOnTheOrder) {
   std::mt19937_64 random(2);
   std::vector<WorkItem> items = random_items(random, 200);
-  for (std::size_t k = 0; k < 50; ++k) items[k].bytes = 1000;  // ties
+  for (std::size_t k = 0; k < 50; ++k) items[k].cost = 1000;  // ties
   std::map<std::string, std::uint32_t> first;
   const std::vector<std::uint32_t> shard_of = deal_out(items, 7);
   for (std::size_t k = 0; k < items.size(); ++k) first[items[k].name] = shard_of[k];
@@ -131,11 +132,74 @@ TEST_F(JobArray, OutsideOfOneNothingIsGuessed) {
 }
 
 AssetRecord record(const std::string& output, const std::string& outcome, const std::string& more = "") {
-  const std::string line = R"({"schema":"sqmap.bake/2","type":"asset","input":"m","output":")" + output +
+  const std::string line = R"({"schema":"sqmap.bake/3","type":"asset","input":"m","output":")" + output +
                            R"(","outcome":")" + outcome + "\"" + more + "}\n";
   const Result<AssetRecords> parsed = parse_asset_records(line, "test");
   EXPECT_TRUE(parsed);
   return parsed.value().records.front();
+}
+
+TEST(Costs, AreTheTimesOfAnEarlierBakeWhereThereAreAny) {
+  const std::vector<InputFile> inputs{{"a", 10}, {"b", 5'000'000}, {"c", 70'000}, {"d", 2'000'000}};
+  const std::vector<std::uint64_t> costs =
+      expected_costs(inputs, {{"a", 30}, {"b", 10}, {"c", 20}, {"x", 1}});
+  EXPECT_NEAR(static_cast<double>(costs[0]), 3 * static_cast<double>(costs[1]), 3);
+  EXPECT_NEAR(static_cast<double>(costs[2]), 2 * static_cast<double>(costs[1]), 3);
+  const std::vector<std::uint64_t> by_size = expected_costs(inputs, {{"x", 1}});
+  EXPECT_EQ(costs[3], by_size[3]) << "no time of d";
+  EXPECT_EQ(costs[2], by_size[2]) << "the median of the ratios is that of c, so the unit is that of sizes";
+  EXPECT_GT(by_size[1], by_size[0]);
+}
+
+TEST(Costs, OnlyBakesThatRanTell) {
+  const std::vector<AssetRecord> records{record("a", "ok", R"(,"seconds":5.0,"cached":false)"),
+                                         record("a", "timeout", R"(,"seconds":9.0,"cached":false)"),
+                                         record("a", "ok", R"(,"seconds":0.01,"cached":true)"),
+                                         record("a", "cancelled", R"(,"seconds":0.0,"cached":false)"),
+                                         record("a", "ok")};
+  EXPECT_EQ(bake_times(records), (BakeTimes{{"m", 9.0}}));
+}
+
+// Times as heavy-tailed as those of real meshes, which have little to do with the sizes.
+TEST(Costs, TimesBalanceShardsThatSizesDoNot) {
+  std::mt19937_64 random(4);
+  std::lognormal_distribution<double> seconds(0, 1);
+  for (const std::uint32_t shard_count : {2U, 8U, 16U}) {
+    std::vector<InputFile> inputs;
+    BakeTimes times;
+    double sum_s = 0;
+    for (int k = 0; k < 200; ++k) {
+      inputs.push_back({"mesh " + std::to_string(k), random() % 1'000'000});
+      sum_s += times[inputs.back().name] = seconds(random);
+    }
+    const auto slowest_over_mean = [&](const BakeTimes& known) {
+      const std::vector<std::uint64_t> costs = expected_costs(inputs, known);
+      std::vector<WorkItem> items;
+      for (std::size_t k = 0; k < inputs.size(); ++k) items.push_back({inputs[k].name, costs[k]});
+      const std::vector<std::uint32_t> shard_of = deal_out(items, shard_count);
+      std::vector<double> load_s(shard_count);
+      for (std::size_t k = 0; k < inputs.size(); ++k) load_s[shard_of[k]] += times[inputs[k].name];
+      return std::ranges::max(load_s) * shard_count / sum_s;
+    };
+    EXPECT_LT(slowest_over_mean(times), 1.02);
+    EXPECT_GT(slowest_over_mean({}), 1.02) << "the draw is too easy";
+  }
+}
+
+TEST(Records, OfALaterVersionAreRefusedAndThoseOfEarlierOnesRead) {
+  const auto parsed = [](const std::string& schema) {
+    return parse_asset_records(
+        R"({"schema":")" + schema + R"(","type":"asset","input":"m","output":"o","outcome":"ok"})" + "\n",
+        "test");
+  };
+  ASSERT_TRUE(parsed("sqmap.bake/2"));
+  EXPECT_EQ(parsed("sqmap.bake/2").value().records.size(), 1U);
+  for (const char* schema : {"sqmap.bake/4", "sqmap.bake/3.1", "sqmap.bake/", "sqmap.bake/x"}) {
+    const Result<AssetRecords> later = parsed(schema);
+    ASSERT_FALSE(later) << schema;
+    EXPECT_EQ(later.error().status, Status::kUnsupportedVersion);
+    EXPECT_NE(later.error().finding.find("test:1"), std::string::npos);
+  }
 }
 
 TEST(Merge, ASuccessReplacesAFailureWhicheverCameFirst) {

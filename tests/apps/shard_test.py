@@ -63,6 +63,50 @@ class Shards(FolderTest):
         self.assertEqual(self.bake("b"), [str(p) for p in sorted(Path(e) for e in everything)])
         self.assertEqual(self.bundles(self.folder / "a"), self.bundles(self.folder / "b"))
 
+    def test_what_meshes_took_decides_the_shards_and_not_their_size(self):
+        where = (self.models, "--recursive", "--out-dir", self.folder / "a")
+        shown = run("sqbake", "bake", *where, *ROUGH, "--format", "ndjson", "--cache", self.folder / "cache").stdout
+        slow = str(self.models / "m0.off")  # of the smallest files
+        records = self.folder / "records.ndjson"
+        records.write_text("".join(json.dumps({**r, "seconds": 1000.0 if r.get("input") == slow else 1.0}) + "\n"
+                                   for r in map(json.loads, shown.splitlines())), encoding="utf-8")
+        plan = run("sqbake", "plan", *where, "--shards", "2", "--costs", records, "--format", "ndjson").stdout
+        shards = {1: [], 2: []}
+        for asset in map(json.loads, plan.splitlines()):
+            shards[asset["shard"]].append(asset["input"])
+        self.assertEqual(shards[1], [slow])
+        for k in (1, 2):
+            self.assertEqual(self.bake("b", "--shard", f"{k}/2", "--costs", records), shards[k])
+        alone = run("sqbake", "bake", *where, "--costs", records)
+        self.assert_exit(alone, 2)
+        self.assertIn("--shard", alone.stderr)
+        missing = run("sqbake", "plan", *where, "--costs", self.folder / "none")
+        self.assert_exit(missing, 3)
+        again = run("sqbake", "bake", *where, *ROUGH, "--format", "ndjson", "--cache", self.folder / "cache").stdout
+        records.write_text(again, encoding="utf-8")  # nothing was baked, so it tells nothing
+        result = run("sqbake", "plan", *where, "--costs", records)
+        self.assert_exit(result, 0)
+        self.assertIn("tells of no bake", result.stderr)
+
+    def test_score_shards_ranks_costs_and_adds_up_the_shards(self):
+        flat, meshes = self.folder / "flat", {}
+        flat.mkdir()
+        for subdivisions in range(4):
+            name = f"s{subdivisions}.off"
+            meshes[name] = write_off(flat / name, sphere(subdivisions)).stat().st_size
+        for exchange, correlation in ((False, "1.00"), (True, "-1.00")):
+            seconds = dict(zip(sorted(meshes, key=meshes.get, reverse=exchange), (1, 2, 3, 10)))
+            times = self.folder / "times.tsv"
+            times.write_text("".join(f"{s}\t{name}\n" for name, s in seconds.items()), encoding="utf-8")
+            result = subprocess.run([SLURM.parent / "score_shards", flat, "--times", times, "--bin", BIN, "--", "--up", "y"],
+                                    capture_output=True, text=True, timeout=TIMEOUT_S, check=False)
+            self.assertEqual(result.returncode, 0, result.stderr)
+            self.assertIn(f"4 meshes, 16.0 processor s, the slowest 10.0 s; rank correlation of cost and seconds "
+                          f"{correlation}", result.stdout)
+            two, three = (line.split() for line in result.stdout.splitlines()[2:4])
+            self.assertEqual((two[0], two[-1]), ("2", "1.25"), "10 s in one shard, 6 s in the other: 10 over 8")
+            self.assertEqual((three[0], three[-1]), ("3", "1.88"))
+
     def test_a_shard_that_is_none_is_refused_before_anything_is_written(self):
         for shard in ("0/3", "4/3", "x", "auto"):
             result = run("sqbake", "bake", self.models, "--recursive", "--out-dir", self.folder / "out", "--shard", shard)
@@ -180,7 +224,15 @@ class Shards(FolderTest):
         self.assertEqual(self.submit(shards=2), "merge ended with 0")
         records = self.folder / "farm" / "records"
         self.assertEqual(sorted(p.name for p in records.glob("shard-*.ndjson")), ["shard-1.ndjson", "shard-2.ndjson"])
+        slow = str(self.models / "m0.off")
+        told = [json.loads(line) for line in (records / "all.ndjson").read_text(encoding="utf-8").splitlines()]
+        for record in told:
+            if record.get("input") == slow:
+                record["seconds"] = 1000.0
+        (records / "all.ndjson").write_text("".join(json.dumps(r, separators=(",", ":")) + "\n" for r in told), "utf-8")
         self.assertEqual(self.submit(shards=3, lost_task="3"), "merge ended with 1")
+        plan = [json.loads(line) for line in (records / "plan.ndjson").read_text(encoding="utf-8").splitlines()]
+        self.assertEqual([asset["input"] for asset in plan if asset["shard"] == 1], [slow], "it takes longest by far")
         self.assertTrue(json.loads((records / "all.ndjson").read_text(encoding="utf-8").splitlines()[-1])["missing"])
 
 

@@ -22,8 +22,6 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr std::uint64_t kLargestRecords = std::uint64_t{1} << 30;
-
 struct MergeArguments {
   std::vector<std::filesystem::path> records;
   std::filesystem::path plan, output, report;
@@ -35,16 +33,10 @@ struct ReadRecords {
   std::vector<std::string> unfinished;  ///< files whose runs were stopped before they could sum up
 };
 
-std::string_view text_of(const std::vector<std::uint8_t>& bytes) {
-  return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
-}
-
 Result<ReadRecords> read_records(Console& console, const std::vector<std::filesystem::path>& files) {
   ReadRecords all;
   for (const std::filesystem::path& file : files) {
-    const Result<std::vector<std::uint8_t>> bytes = read_file(file, kLargestRecords);
-    if (!bytes) return bytes.error();
-    Result<AssetRecords> records = parse_asset_records(text_of(bytes.value()), file.string());
+    Result<AssetRecords> records = read_asset_records(file);
     if (!records) return records.error();
     if (records.value().is_cut_off)
       console.warning(fmt::format("{}: the last record is cut off and left out", file.string()));
@@ -87,27 +79,23 @@ Outcome check_outputs(const MergeArguments& arguments) {
 }
 
 Exit run_merge(Console& console, const MergeArguments& arguments) {
-  const auto refuse = [&](const Error& error) {
-    console.error(error.remedy.empty() ? error.finding : error.finding + "; " + error.remedy);
-    return exit_for(error.status);
-  };
-  if (const Outcome ok = check_outputs(arguments); !ok) return refuse(ok.error());
+  if (const Outcome ok = check_outputs(arguments); !ok) return refuse(console, ok.error());
   std::optional<std::vector<PlannedAsset>> plan;
   if (!arguments.plan.empty()) {
-    const Result<std::vector<std::uint8_t>> bytes = read_file(arguments.plan, kLargestRecords);
-    if (!bytes) return refuse(bytes.error());
-    Result<std::vector<PlannedAsset>> parsed = parse_plan(text_of(bytes.value()), arguments.plan.string());
-    if (!parsed) return refuse(parsed.error());
+    const Result<std::vector<std::uint8_t>> bytes = read_file(arguments.plan, kLargestRecords_bytes);
+    if (!bytes) return refuse(console, bytes.error());
+    Result<std::vector<PlannedAsset>> parsed = parse_plan(as_text(bytes.value()), arguments.plan.string());
+    if (!parsed) return refuse(console, parsed.error());
     plan = std::move(parsed).value();
   }
   Result<ReadRecords> read = read_records(console, arguments.records);
-  if (!read) return refuse(read.error());
+  if (!read) return refuse(console, read.error());
   auto& [records, unfinished] = read.value();
   if (records.empty() && !plan)
-    return refuse({Status::kInvalidAsset,
-                   "no record of an asset in " + arguments.records.front().string() +
-                       (arguments.records.size() > 1 ? " and the other files" : ""),
-                   "give what `sqbake bake --format ndjson` wrote"});
+    return refuse(console, {Status::kInvalidAsset,
+                            "no record of an asset in " + arguments.records.front().string() +
+                                (arguments.records.size() > 1 ? " and the other files" : ""),
+                            "give what `sqbake bake --format ndjson` wrote"});
   const MergedRecords merged = merge_records(std::move(records), plan ? &*plan : nullptr);
   // A plan tells whether anything is missing; else what these runs had still to do is not known.
   const bool is_complete = merged.is_complete() && (plan || unfinished.empty());
@@ -134,11 +122,11 @@ Exit run_merge(Console& console, const MergeArguments& arguments) {
   if (arguments.output.empty() || arguments.output == "-") {
     console.out(text);
   } else if (const Outcome written = write_file(arguments.output, text); !written) {
-    return refuse(written.error());
+    return refuse(console, written.error());
   }
   if (!arguments.report.empty())
     if (const Outcome written = write_file(arguments.report, report_page(merged.records, {})); !written)
-      return refuse(written.error());
+      return refuse(console, written.error());
   return is_complete ? Exit::kOk : Exit::kSomeFailed;
 }
 

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include <filesystem>
 #include <memory>
 #include <optional>
 #include <string>
@@ -22,25 +23,25 @@ struct PlanArguments {
   JobRequest request;
   std::uint32_t shards = 1;
   std::optional<std::string> shard;
+  std::filesystem::path costs;  ///< records; may be empty
   std::string format = "text";
 };
 
 Exit run_plan(Console& console, const PlanArguments& arguments) {
-  const auto refuse = [&](const Error& error) {
-    console.error(error.remedy.empty() ? error.finding : error.finding + "; " + error.remedy);
-    return exit_for(error.status);
-  };
   std::optional<Shard> only;
   if (arguments.shard) {
     const Result<Shard> shard = parse_shard(*arguments.shard);
-    if (!shard) return refuse(shard.error());
+    if (!shard) return refuse(console, shard.error());
     only = shard.value();
   }
-  if (const auto ok = options_from(arguments.request.config.command_line); !ok) return refuse(ok.error());
+  if (const auto ok = options_from(arguments.request.config.command_line); !ok)
+    return refuse(console, ok.error());
   const Result<JobList> list = list_jobs(arguments.request);
-  if (!list) return refuse(list.error());
+  if (!list) return refuse(console, list.error());
   const std::uint32_t count = only ? only->count : arguments.shards;
-  const std::vector<std::uint32_t> shard_of = shards_of(list.value(), count);
+  const Result<std::vector<std::uint64_t>> costs = costs_of(console, list.value(), arguments.costs);
+  if (!costs) return refuse(console, costs.error());
+  const std::vector<std::uint32_t> shard_of = shards_of(list.value(), costs.value(), count);
 
   struct Sum {
     std::size_t assets = 0;
@@ -49,7 +50,7 @@ Exit run_plan(Console& console, const PlanArguments& arguments) {
   std::vector<Sum> sums(count);
   for (std::size_t k = 0; k < shard_of.size(); ++k) {
     const Job& job = list.value().jobs[k];
-    const std::uint64_t cost = estimated_cost(job.input_bytes);
+    const std::uint64_t cost = costs.value()[k];
     ++sums[shard_of[k]].assets;
     sums[shard_of[k]].cost += cost;
     if (only && shard_of[k] != only->index) continue;
@@ -90,7 +91,8 @@ std::function<Exit(Console&)> declare_plan(CLI::App& app) {
       "Examples:\n"
       "  sqbake plan models/ --recursive --out-dir bundles/ --shards 8\n"
       "  sqbake plan models/ --recursive --out-dir bundles/ --shards 8 --format ndjson > plan.ndjson\n"
-      "  sqbake plan models/ --recursive --out-dir bundles/ --shard 3/8\n");
+      "  sqbake plan models/ --recursive --out-dir bundles/ --shard 3/8\n"
+      "  sqbake plan models/ --recursive --out-dir bundles/ --shards 8 --costs last-month.ndjson\n");
   app.add_option("INPUT", request.inputs, "Mesh files, folders, patterns and @lists of them");
   app.add_option("--manifest", request.manifest, "As of `sqbake bake`")->type_name("FILE.toml");
   app.add_option("--out-dir", request.out_dir, "As of `sqbake bake`")->type_name("DIR")->required();
@@ -103,6 +105,9 @@ std::function<Exit(Console&)> declare_plan(CLI::App& app) {
   CLI::Option* shards = app.add_option("--shards", args->shards, "Number of shards (default 1)")
                             ->check(CLI::Range(1, 1'000'000).description(""))
                             ->type_name("N");
+  app.add_option("--costs", args->costs,
+                 "Records of an earlier bake (--format ndjson): what a mesh took then counts, not its size")
+      ->type_name("FILE.ndjson");
   app.add_option("--shard", args->shard, "Only one of N; auto: as the job array of Slurm or Kubernetes says")
       ->excludes(shards)
       ->type_name("I/N");

@@ -14,10 +14,6 @@ namespace sqmap::apps {
 namespace {
 
 constexpr std::uint32_t kMostShards = 1'000'000;
-// As large as most files are: size tells little about the time. Of the six samples (scripts/bake_samples)
-// hand, the smallest file, takes longer than armadillo, the largest, which has 23 times the bytes: what costs
-// is to refine the parts. So shards get about as many meshes each, and only the largest files count for more.
-constexpr std::uint64_t kFixedCost = 1'000'000;
 
 std::optional<std::uint32_t> number(std::string_view text) {
   std::uint32_t value = 0;
@@ -73,13 +69,11 @@ Result<Shard> parse_shard(std::string_view text) {
                fmt::format("--shard {}: must be I/N with 1 <= I <= N <= {}, or auto", text, kMostShards), ""};
 }
 
-std::uint64_t estimated_cost(std::uint64_t input_bytes) { return kFixedCost + input_bytes; }
-
 std::vector<std::uint32_t> deal_out(std::span<const WorkItem> items, std::uint32_t shard_count) {
   std::vector<std::size_t> order(items.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
   std::ranges::sort(order, [&](std::size_t a, std::size_t b) {
-    return std::tie(items[b].bytes, items[a].name) < std::tie(items[a].bytes, items[b].name);
+    return std::tie(items[b].cost, items[a].name) < std::tie(items[a].cost, items[b].name);
   });
   struct Load {
     std::uint64_t cost;
@@ -94,7 +88,7 @@ std::vector<std::uint32_t> deal_out(std::span<const WorkItem> items, std::uint32
   for (const std::size_t item : order) {
     std::ranges::pop_heap(heap, is_heavier);
     shard_of[item] = heap.back().shard;
-    heap.back().cost += estimated_cost(items[item].bytes);
+    heap.back().cost += items[item].cost;
     std::ranges::push_heap(heap, is_heavier);
   }
   return shard_of;

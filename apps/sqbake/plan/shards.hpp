@@ -27,16 +27,12 @@ Result<Shard> parse_shard(std::string_view text);
 Result<std::optional<Shard>> shard_of_job_array();
 
 struct WorkItem {
-  std::string name;       ///< unique
-  std::uint64_t bytes{};  ///< of the input
+  std::string name;      ///< unique
+  std::uint64_t cost{};  ///< expected, in any unit
 };
 
-/// Expected cost of a bake, in any unit: a fixed part, and one that grows with the mesh. A guess; see
-/// kFixedCost.
-std::uint64_t estimated_cost(std::uint64_t input_bytes);
-
 /// The shard of each item: the costliest first, each to the shard that has least so far (no shard then
-/// exceeds 4/3 of the best possible; Graham 1969). Depends on names and sizes, not on the order of the list.
+/// exceeds 4/3 of the best possible; Graham 1969). Depends on names and costs, not on the order of the list.
 std::vector<std::uint32_t> deal_out(std::span<const WorkItem> items, std::uint32_t shard_count);
 
 }  // namespace sqmap::apps

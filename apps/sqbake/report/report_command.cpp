@@ -17,8 +17,6 @@
 namespace sqmap::apps {
 namespace {
 
-constexpr std::uint64_t kLargestRecords = std::uint64_t{1} << 30;
-
 struct ReportArguments {
   std::vector<std::filesystem::path> records;
   std::filesystem::path output;
@@ -27,23 +25,15 @@ struct ReportArguments {
 };
 
 Exit run_report(Console& console, const ReportArguments& arguments) {
-  const auto refuse = [&](const std::string& file, const Error& error) {
-    console.error(message_for(file, error));
-    return exit_for(error.status);
-  };
   if (arguments.output != "-") {
     Outcome ok = check_apart("-o", arguments.output, "an input", arguments.records);
     if (ok) ok = check_page("-o", arguments.output, arguments.force);
-    if (!ok) return refuse("-o " + arguments.output.string(), ok.error());
+    if (!ok) return refuse(console, "-o " + arguments.output.string(), ok.error());
   }
   std::vector<AssetRecord> all;
   for (const std::filesystem::path& file : arguments.records) {
-    const Result<std::vector<std::uint8_t>> bytes =
-        file == "-" ? read_stdin(kLargestRecords) : read_file(file, kLargestRecords);
-    if (!bytes) return refuse(file.string(), bytes.error());
-    const std::string_view text(reinterpret_cast<const char*>(bytes.value().data()), bytes.value().size());
-    Result<AssetRecords> records = parse_asset_records(text, file.string());
-    if (!records) return refuse(file.string(), records.error());
+    Result<AssetRecords> records = read_asset_records(file);
+    if (!records) return refuse(console, file.string(), records.error());
     if (records.value().is_cut_off)
       console.warning(fmt::format("{}: the last record is cut off and left out", file.string()));
     for (AssetRecord& record : records.value().records) all.push_back(std::move(record));
@@ -54,7 +44,7 @@ Exit run_report(Console& console, const ReportArguments& arguments) {
   if (arguments.output == "-") {
     console.out(page);
   } else if (const Outcome written = write_file(arguments.output, page); !written) {
-    return refuse(arguments.output.string(), written.error());
+    return refuse(console, arguments.output.string(), written.error());
   }
   return Exit::kOk;
 }
