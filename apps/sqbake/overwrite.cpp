@@ -2,11 +2,14 @@
 #include "overwrite.hpp"
 
 #include <algorithm>
+#include <cerrno>
+#include <cstring>
 #include <fstream>
 #include <string>
 #include <system_error>
 
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include "report/report_page.hpp"
 
@@ -30,6 +33,13 @@ Outcome check_folder(std::string_view option, const fs::path& file, std::span<co
   if (fs::is_directory(file, code))
     return Error{Status::kFileUnwritable, fmt::format("{} {}: is a folder", option, file.string()),
                  "name a file"};
+  // A file is replaced, which needs the folder; a device is written to. A folder that a bake makes is not
+  // there.
+  const bool is_replaced = !fs::exists(file, code) || fs::is_regular_file(file, code);
+  if (is_replaced && fs::is_directory(folder, code) && ::access(folder.c_str(), W_OK | X_OK) != 0)
+    return Error{Status::kFileUnwritable,
+                 fmt::format("{} {}: {}: {}", option, file.string(), folder.string(), std::strerror(errno)),
+                 "check the folder's permissions, or name another file"};
   return Done{};
 }
 

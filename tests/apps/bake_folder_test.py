@@ -5,7 +5,7 @@ import os
 import subprocess
 import unittest
 
-from support import ROUGH, FolderTest, box, run, sphere, write_off
+from support import NOBODY, ROUGH, FolderTest, box, run, sphere, write_off
 
 
 class Folder(FolderTest):
@@ -92,18 +92,17 @@ class Folder(FolderTest):
         secret = write_off(self.models / "secret.obj", box())
         self.folder.chmod(0o777)
         locked.chmod(0)
-        nobody = {"user": 65534, "group": 65534, "extra_groups": ()}
         try:
-            run("sqbake", "--version", **nobody).check_returncode()
+            run("sqbake", "--version", **NOBODY).check_returncode()
         except (OSError, subprocess.CalledProcessError) as problem:
             self.skipTest(f"nobody may not start sqbake here: {problem}")
-        self.refuse(f"{locked}: Permission denied", self.models, "--recursive", **nobody)
-        self.refuse(f"{locked}: Permission denied", f"{self.models}/**/*.off", **nobody)
+        self.refuse(f"{locked}: Permission denied", self.models, "--recursive", **NOBODY)
+        self.refuse(f"{locked}: Permission denied", f"{self.models}/**/*.off", **NOBODY)
         secret.chmod(0)
-        self.refuse(f"{secret}: Permission denied", self.models, **nobody)
+        self.refuse(f"{secret}: Permission denied", self.models, **NOBODY)
         locked.chmod(0o755)
         secret.chmod(0o644)
-        self.assert_exit(run("sqbake", "bake", self.models, "--recursive", "--out-dir", self.out, "-n", **nobody), 0)
+        self.assert_exit(run("sqbake", "bake", self.models, "--recursive", "--out-dir", self.out, "-n", **NOBODY), 0)
 
     def test_a_folder_without_meshes_is_refused(self):
         result = run("sqbake", "bake", self.models / "deep" / "..", self.out.parent / "none", "--out-dir", self.out)

@@ -5,11 +5,12 @@ import json
 import math
 import re
 import struct
+import subprocess
 import unittest
 import zlib
 from html.parser import HTMLParser
 
-from support import FolderTest, ROUGH, box, run, sphere, write_off
+from support import NOBODY, FolderTest, ROUGH, box, run, sphere, write_off
 
 VOID = {"meta", "img", "input", "br"}
 
@@ -98,7 +99,7 @@ class Report(FolderTest):
 
     @staticmethod
     def record(name, outcome="ok", **more):
-        record = {"schema": "sqmap.bake/2", "type": "asset", "input": name, "output": name + ".h5", "outcome": outcome,
+        record = {"schema": "sqmap.bake/3", "type": "asset", "input": name, "output": name + ".h5", "outcome": outcome,
                   "seconds": 1.0, "cached": False, "degradations": [], "warnings": []}
         return {**record, **more}
 
@@ -133,6 +134,22 @@ class Report(FolderTest):
             self.assertIn(named, result.stderr)
         self.assertEqual(self.files(), ["ball.off"])
 
+    def test_a_folder_that_may_not_be_written_is_found_before_the_first_bake(self):
+        source, kept, out = write_off(self.folder / "ball.off", sphere(1)), self.folder / "kept", self.folder / "out"
+        for folder, mode in ((self.folder, 0o755), (kept, 0o755), (out, 0o777)):
+            folder.mkdir(exist_ok=True)
+            folder.chmod(mode)
+        try:
+            run("sqbake", "--version", **NOBODY).check_returncode()
+        except (OSError, subprocess.CalledProcessError) as problem:
+            self.skipTest(f"nobody may not start sqbake here: {problem}")
+        for side in (("--report", kept / "page.html"), ("--depfile", kept / "a.d")):
+            result = run("sqbake", "bake", source, *ROUGH, "-o", out / "a.h5", *side, **NOBODY)
+            self.assert_exit(result, 3)
+            self.assertIn(f"{kept}: Permission denied", result.stderr)
+        self.assertEqual(list(out.iterdir()), [])
+        self.assert_exit(run("sqbake", "bake", source, *ROUGH, "-o", out / "a.h5", "--depfile", "/dev/null", **NOBODY), 0)
+
     def test_neither_a_page_nor_a_merge_takes_the_place_of_its_input_or_of_a_foreign_file(self):
         line = json.dumps(self.record("a.off", parts=1)) + "\n"
         for name in ("x.ndjson", "x.html", "notes.txt", "plan.ndjson"):
@@ -164,7 +181,7 @@ class Report(FolderTest):
 
     def test_a_merge_replaces_what_a_merge_wrote_an_empty_file_and_with_force_any(self):
         line = json.dumps(self.record("a.off", parts=1)) + "\n"
-        summary = json.dumps({"schema": "sqmap.bake/2", "type": "summary"}) + "\n"
+        summary = json.dumps({"schema": "sqmap.bake/3", "type": "summary"}) + "\n"
         (self.folder / "x.ndjson").write_text(line + summary, encoding="ascii")
         (self.folder / "all.ndjson").touch()
         merge = ("merge", "x.ndjson", "-o", "all.ndjson", "--report", "page.html")

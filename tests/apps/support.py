@@ -11,6 +11,8 @@ BIN = Path(os.environ["SQMAP_BIN_DIR"])
 # What is tested is the baker, not what it kept; tests of the cache name theirs.
 os.environ["SQMAP_CACHE_DIR"] = ""
 TIMEOUT_S = 240
+# Options of run() for a user who owns nothing.
+NOBODY = {"user": 65534, "group": 65534, "extra_groups": ()}
 # Enough where a test is not about accuracy.
 ROUGH = ("--max-error", "1%")
 
