@@ -177,7 +177,7 @@ class Cache(FolderTest):
         self.assert_exit(show("verify"), 0)
         self.assert_exit(show("gc", "--max-size", "1"), 0)
         stats = json.loads(show("stats").stdout)
-        self.assertEqual((stats["results"], stats["bundles"]), (0, 0))
+        self.assertEqual((stats["results"], stats["bundles"], stats["outputs"], stats["bytes"]), (0, 0, 0, 0))
         missing = run("sqbake", "cache", "stats", "--cache", self.folder / "none")
         self.assert_exit(missing, 3)
 

@@ -113,6 +113,17 @@ std::uint64_t remove_until_it_fits(Inventory& inventory, const std::map<std::str
   });
 }
 
+/// Removes the notes on the longest untouched outputs until the rest fits: what else may go has gone.
+std::uint64_t remove_outputs_until_it_fits(Inventory& inventory, std::uint64_t max_bytes) {
+  std::uint64_t total = inventory.bytes();
+  std::ranges::stable_sort(inventory.outputs, std::greater<>(), &StoredFile::age);
+  return remove_if(inventory.outputs, [&](const StoredFile& output) {
+    if (total <= max_bytes) return false;
+    total -= output.bytes;
+    return true;
+  });
+}
+
 /// Removes bundles that no result names any more, and those that none ever named.
 std::uint64_t remove_objects(Inventory& inventory, const std::map<std::string, std::string>& object_of) {
   std::set<std::string> named_before, named;
@@ -190,6 +201,8 @@ Result<CacheCollection> collect_cache(const CacheStore& store, const CollectLimi
   if (limits.max_bytes)
     collection.removed_results += remove_until_it_fits(inventory, object_of, *limits.max_bytes);
   collection.removed_objects += remove_objects(inventory, object_of);
+  if (limits.max_bytes)
+    collection.removed_outputs += remove_outputs_until_it_fits(inventory, *limits.max_bytes);
   collection.bytes_after = inventory.bytes();
   return collection;
 }
