@@ -123,6 +123,11 @@ std::string unknown_below(const CLI::App& app, int argc, char** argv) {
 std::string one_line(std::string text) {
   std::replace(text.begin(), text.end(), '\n', ' ');
   while (!text.empty() && text.back() == ' ') text.pop_back();
+  // CLI11's words for an option that is given twice.
+  constexpr std::string_view kTooMany = ": At Most 1 required but received ";
+  if (const std::size_t at = text.find(kTooMany); at != std::string::npos)
+    text = fmt::format("{}: given {} times, may be given once", text.substr(0, at),
+                       text.substr(at + kTooMany.size()));
   return text;
 }
 

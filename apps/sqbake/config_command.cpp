@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <memory>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include <CLI/CLI.hpp>
@@ -33,10 +34,13 @@ const ManifestAsset* asset_of(const Manifest& manifest, const std::filesystem::p
 }
 
 std::string text_report(const std::filesystem::path& mesh, const EffectiveSettings& effective) {
+  std::size_t width = 0;
+  for (const Setting& setting : all_settings())
+    width = std::max(width, std::string_view(setting.name).size());
   std::string text = mesh.string() + "\n";
   for (const Setting& setting : all_settings()) {
     const SettingValue& value = effective.values.find(setting.name)->second;
-    text += fmt::format("  {:<10} {:<12} {}\n", setting.name, value.text, value.source);
+    text += fmt::format("  {:<{}} {:<12} {}\n", setting.name, width, value.text, value.source);
   }
   return text;
 }
@@ -51,14 +55,10 @@ std::string json_report(const std::filesystem::path& mesh, const EffectiveSettin
 }
 
 Exit run_show(Console& console, const ConfigArguments& arguments) {
-  const auto refuse = [&](const Error& error) {
-    console.error(error.remedy.empty() ? error.finding : error.finding + "; " + error.remedy);
-    return exit_for(error.status);
-  };
   std::optional<Manifest> manifest;
   if (!arguments.manifest.empty()) {
     Result<Manifest> read = read_manifest(arguments.manifest);
-    if (!read) return refuse(read.error());
+    if (!read) return refuse(console, read.error());
     manifest = std::move(read).value();
   }
   ConfigFiles files(arguments.request);
@@ -66,8 +66,9 @@ Exit run_show(Console& console, const ConfigArguments& arguments) {
     const ManifestAsset* asset = manifest ? asset_of(*manifest, mesh) : nullptr;
     const Result<EffectiveSettings> effective =
         files.settings_of(mesh, manifest ? &*manifest : nullptr, asset);
-    if (!effective) return refuse(effective.error());
-    if (const auto ok = options_from(texts_of(effective.value().values)); !ok) return refuse(ok.error());
+    if (!effective) return refuse(console, effective.error());
+    if (const auto ok = options_from(texts_of(effective.value().values)); !ok)
+      return refuse(console, ok.error());
     console.out(arguments.format == "text" ? text_report(mesh, effective.value())
                                            : json_report(mesh, effective.value()));
   }

@@ -2,6 +2,7 @@
 """Which meshes are named, where their bundles go and which settings hold: folders, patterns, lists, manifests, project
 files and sidecars. All by `--dry-run` and `config show`, but where bytes are the point."""
 import json
+import re
 import unittest
 
 from support import ROUGH, FolderTest, box, run, sphere, write_off
@@ -255,6 +256,8 @@ class Settings(FolderTest):
                      "fallback"):
             self.assertRegex(text, rf"(?m)^  {name} +\S+ +built in$")
         self.assertRegex(text, r"(?m)^  timeout +5m +command line$")
+        columns = {re.match(r"  \S+ +", line).end() for line in text.splitlines()[1:]}
+        self.assertEqual(len(columns), 1, "the values stand below each other")
 
 
 class Spelling(unittest.TestCase):

@@ -68,6 +68,8 @@ class Usage(unittest.TestCase):
         (("sqbake", "cache", "gc", "--max-size", "lots"), "`lots`"),
         (("sqbake", "report", "-"), "--output"),
         (("sqbake", "plan"), "--out-dir"),
+        (("sqbake", "bake", "x.off", "-o", "a.h5", "-o", "b.h5"), "--output: given 2 times, may be given once"),
+        (("sqbake", "bake", "x.off", "--unit", "m", "--unit", "m", "--unit", "m"), "given 3 times"),
         (("sqbake", "merge"), "RECORDS"),
         (("sqinfo", "show"), "BUNDLE"),
         (("sqinfo", "query", "x.h5"), "--points"),
