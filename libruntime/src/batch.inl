@@ -287,7 +287,7 @@ HWY_NOINLINE void Answerer::hand_over(Findings& findings) noexcept {
 }
 
 // What Object promises of the stack; the rest is a few vectors that did not fit registers.
-static_assert(sizeof(Answerer) + sizeof(Walker) + sizeof(Chunk) + sizeof(Findings) + sizeof(Remote) <=
+static_assert(sizeof(Answerer) + sizeof(Walker) + sizeof(Chunk) + sizeof(Findings) + sizeof(EntryList) <=
               std::size_t{384} * 1024);
 
 /// Default answers.

@@ -48,6 +48,9 @@ inline constexpr float kLeastAngle =
     1e-6F;  ///< squared sine between rows and columns, below which one is a pole
 /// Cells: shorter steps end the search.
 inline constexpr float kLeastCellStep = 0.03F;
+/// Nor is a step worth its while that brings the point nearer by less than this share of a depth step, as its
+/// linear model foretells: the map knows no better.
+inline constexpr float kLeastGain = 0.1F;
 /// The normal of a patch is replaced by the direction to its nearest point where the cosine between them is
 /// less than kBack, unless the point is so near, as a share of far_from(), that its side is in doubt.
 inline constexpr float kBack = -0.5F, kNearShare = 0.1F;
@@ -143,10 +146,13 @@ class Chart {
     return r.point_m - depth * r.normal;
   }
   ChartAnswer second_layer(const Vec3f& p, const Foot<float>& foot, std::uint32_t stride) const noexcept;
+  struct Step {
+    float row, col;  ///< [cells of level 0]
+    float gain;      ///< of the squared distance, by the linear model
+  };
   /// Gauss-Newton from (row, col), towards the point of the patch where `error` = p - patch.point is normal
   /// to it.
-  void step_towards(const Patch& patch, const Vec3f& error, std::uint32_t stride, float& d_row,
-                    float& d_col) const noexcept;
+  Step step_towards(const Patch& patch, const Vec3f& error, std::uint32_t stride) const noexcept;
   /// From (answer.row, answer.col), whose cell bounds a patch.
   void third_layer(const Vec3f& p, std::uint32_t stride, ChartAnswer& answer) const noexcept;
   bool vertex_fan(const Vec3f& p, const Cell& cell, ChartAnswer& answer) const noexcept;
@@ -205,16 +211,20 @@ inline ChartAnswer Chart::look(const Vec3f& p, bool third, std::uint32_t level, 
     answer.certainty = std::numeric_limits<float>::infinity();
   }
   if (third) {
-    // The search goes downhill only, so it begins where it is nearer. Points outside the mesh, the most of
-    // those that touch nothing, do with the foot; an inner point needs a distance, or it would feel no force.
+    // The search goes downhill only, so an inner point that stays far from the surface begins again
+    // elsewhere, and one whose foot has no patch begins where that is nearer. Points outside the mesh, the
+    // most of those that touch nothing, do with the foot; an inner point needs a distance, or it would feel
+    // no force.
     Start first, other;
     if (answer.bounds_patch) first = start_at(p, foot.row, foot.col, stride);
     if (answer.inside) {
-      if (!answer.bounds_patch) first = start_beside(p, foot.row, foot.col, stride);
-      const std::uint32_t named = resident_.start(part_, foot.row, foot.col, foot.depth_m);
+      const std::uint16_t named = resident_.start(part_, foot.row, foot.col, foot.depth_m);
       if (named != StartTable::kNone)
         other = start_at(p, part_.starts.place(named >> 8U), part_.starts.place(named & 255U), stride);
-      if (other.square < first.square) std::swap(first, other);
+      if (!answer.bounds_patch) {
+        first = start_beside(p, foot.row, foot.col, stride);
+        if (other.square < first.square) std::swap(first, other);
+      }
     }
     ChartAnswer refined = answer;
     if (std::isfinite(first.square)) {
@@ -378,23 +388,24 @@ inline Chart::Start Chart::start_beside(const Vec3f& p, float row, float col,
   return best;
 }
 
-inline void Chart::step_towards(const Patch& patch, const Vec3f& error, std::uint32_t stride, float& d_row,
-                                float& d_col) const noexcept {
+inline Chart::Step Chart::step_towards(const Patch& patch, const Vec3f& error,
+                                       std::uint32_t stride) const noexcept {
   const float a = dot(patch.row, patch.row), b = dot(patch.row, patch.col), c = dot(patch.col, patch.col);
   const float f = dot(patch.row, error), g = dot(patch.col, error);
   const float product = a * c, determinant = product - b * b;
   const bool regular = determinant > kLeastAngle * product;
   const bool rows_only = !regular && a > 0;  // a pole: columns have no length
   const float inverse = 1.0F / (regular ? determinant : rows_only ? a : 1.0F);
-  d_row = regular ? (c * f - b * g) * inverse : rows_only ? f * inverse : 0.0F;
-  d_col = regular ? (a * g - b * f) * inverse : 0.0F;
+  const float d_row = regular ? (c * f - b * g) * inverse : rows_only ? f * inverse : 0.0F;
+  const float d_col = regular ? (a * g - b * f) * inverse : 0.0F;
   // Beside a pole, where columns are short, as far as the rows may go.
   const float most_row = kMostCells * static_cast<float>(stride);
   const float slimness =
       std::sqrt(a / greater(greater(c, kLeastAngle * a), std::numeric_limits<float>::min()));
   const float most_col = lesser(static_cast<float>(part_.cols) * 0.125F, most_row * greater(slimness, 1.0F));
-  d_row = lesser(greater(d_row, -most_row), most_row);
-  d_col = lesser(greater(d_col, -most_col), most_col);
+  Step step{lesser(greater(d_row, -most_row), most_row), lesser(greater(d_col, -most_col), most_col), 0};
+  step.gain = f * step.row + g * step.col;
+  return step;
 }
 
 inline void Chart::third_layer(const Vec3f& p, std::uint32_t stride, ChartAnswer& answer) const noexcept {
@@ -407,18 +418,19 @@ inline void Chart::third_layer(const Vec3f& p, std::uint32_t stride, ChartAnswer
   Vec3f error = p - patch.point, point = patch.point;
   float square = dot(error, error);
   bool on_rim = false;
-  float d_row, d_col;
-  step_towards(patch, error, stride, d_row, d_col);
+  Step ahead = step_towards(patch, error, stride);
+  const float least_gain = kLeastGain * part_.depth_step, least_square = least_gain * least_gain;
   // Always from the nearest place so far; a step that leads away from it is taken again, shorter.
   for (int step = 0; step < kThirdLayerSteps; ++step) {
-    if (std::abs(d_row) + std::abs(d_col) < kLeastCellStep) break;
-    float next_row = lesser(greater(row + d_row, 0.0F), last_row);
-    float next_col = wrapped(col + d_col);
+    if (std::abs(ahead.row) + std::abs(ahead.col) < kLeastCellStep) break;
+    if (ahead.gain * ahead.gain < least_square * square) break;
+    float next_row = lesser(greater(row + ahead.row, 0.0F), last_row);
+    float next_col = wrapped(col + ahead.col);
     Cell next = cell_at(next_row, next_col, stride);
     bool stays = !next.eligible;
     if (stays) {  // half the way, where that is another cell
-      const float half_row = lesser(greater(row + 0.5F * d_row, 0.0F), last_row);
-      const float half_col = wrapped(col + 0.5F * d_col);
+      const float half_row = lesser(greater(row + 0.5F * ahead.row, 0.0F), last_row);
+      const float half_col = wrapped(col + 0.5F * ahead.col);
       const Cell between = cell_at(half_row, half_col, stride);
       if (between.eligible && between.texel[0] != cell.texel[0]) {
         next = between;
@@ -430,8 +442,8 @@ inline void Chart::third_layer(const Vec3f& p, std::uint32_t stride, ChartAnswer
     if (stays) {  // on the rim of the patch
       const auto low_row = static_cast<float>(cell.row), low_col = static_cast<float>(cell.col);
       next = cell;
-      next_row = lesser(greater(row + d_row, low_row), low_row + size);
-      next_col = lesser(greater(col + d_col, low_col), low_col + size);
+      next_row = lesser(greater(row + ahead.row, low_row), low_row + size);
+      next_col = lesser(greater(col + ahead.col, low_col), low_col + size);
       if (std::abs(next_row - row) + std::abs(next_col - col) < kLeastCellStep) break;
       next_col = lesser(next_col, last_col);
     }
@@ -444,10 +456,11 @@ inline void Chart::third_layer(const Vec3f& p, std::uint32_t stride, ChartAnswer
       row = next_row;
       col = next_col;
       on_rim = stays;
-      step_towards(patch, error, stride, d_row, d_col);
+      ahead = step_towards(patch, error, stride);
     } else {
-      d_row *= kBackStep;
-      d_col *= kBackStep;
+      ahead.row *= kBackStep;
+      ahead.col *= kBackStep;
+      ahead.gain *= kBackStep;
     }
   }
   answer.distance = std::sqrt(square);

@@ -39,12 +39,6 @@ class Looker {
 
   /// Layer 2. Wants::reach decides about kWithin.
   SQMAP_KERNEL Look look(const V3& p, M wanted, float reach) const noexcept;
-  /// StartTable::place.
-  HWY_INLINE V start_place(VI k) const noexcept {
-    const StartTable& starts = part_.starts;
-    const VI first = hn::ShiftLeftSame(k, starts.step_shift) + all_int((1U << starts.step_shift) / 2);
-    return to_float(first) + all(0.5F);
-  }
   /// Where layer 2 says the surface is, and its normal there.
   HWY_INLINE V3 surface_at(V row, V col, V crossing) const noexcept {
     const Sample r = sample_at(chart_.table(), row, col);
@@ -57,6 +51,9 @@ class Looker {
         pick(on_patch, patch_normal(cell, row, col), sample_at(chart_.table(), row, col).normal);
     return pick(leaving, all(-1.0F), all(1.0F)) * normal;
   }
+  /// Of what Resident::start names.
+  HWY_INLINE V start_row(VI start) const noexcept { return start_place(hn::ShiftRight<8>(start)); }
+  HWY_INLINE V start_col(VI start) const noexcept { return start_place(hn::And(start, all_int(255))); }
   const Chart& chart() const noexcept { return chart_; }
 
   // What Walker builds on.
@@ -148,6 +145,12 @@ class Looker {
   float turn() const noexcept { return turn_; }
 
  private:
+  /// StartTable::place.
+  HWY_INLINE V start_place(VI k) const noexcept {
+    const StartTable& starts = part_.starts;
+    const VI first = hn::ShiftLeftSame(k, starts.step_shift) + all_int((1U << starts.step_shift) / 2);
+    return to_float(first) + all(0.5F);
+  }
   /// Resident::start.
   HWY_INLINE VI start_of(V row, V col, V depth) const noexcept {
     const StartTable& starts = part_.starts;

@@ -6,16 +6,17 @@
 /// Searches under way: Chart::third_layer. The next step starts from the nearest place so far.
 struct Walk {
   V3 p;
-  V row, col, square, d_row, d_col;
+  V row, col, square, d_row, d_col, gain;  // gain: Chart::Step
   VI cell_row, cell_col;
   V3 point, normal;  // normal: unnormalised
   V on_rim;          // 1 or 0
 };
-constexpr int kWalkFields = 15;  // those of float
+constexpr int kWalkFields = 16;  // those of float
 HWY_INLINE void fields_of(Walk& walk, V* (&fields)[kWalkFields]) {
-  V* const all_fields[] = {&walk.p.x,     &walk.p.y,      &walk.p.z,      &walk.row,      &walk.col,
-                           &walk.square,  &walk.d_row,    &walk.d_col,    &walk.point.x,  &walk.point.y,
-                           &walk.point.z, &walk.normal.x, &walk.normal.y, &walk.normal.z, &walk.on_rim};
+  V* const all_fields[] = {&walk.p.x,      &walk.p.y,      &walk.p.z,     &walk.row,
+                           &walk.col,      &walk.square,   &walk.d_row,   &walk.d_col,
+                           &walk.point.x,  &walk.point.y,  &walk.point.z, &walk.normal.x,
+                           &walk.normal.y, &walk.normal.z, &walk.on_rim,  &walk.gain};
   std::copy_n(all_fields, kWalkFields, fields);
 }
 
@@ -34,10 +35,16 @@ struct alignas(64) Fans {
   std::uint32_t count = 0;
 };
 
-/// Entries far from the surface that was found.
-struct alignas(64) Remote {
+/// Entries set aside, so that vectors are full.
+struct alignas(64) EntryList {
   std::int32_t entry[kPadded];
   std::uint32_t count = 0;
+
+  HWY_INLINE void append(VI entries, M lanes) noexcept {
+    if (none(lanes)) return;
+    hn::StoreU(hn::Compress(entries, hn::RebindMask(kDI, lanes)), kDI, entry + count);
+    count += static_cast<std::uint32_t>(hn::CountTrue(kD, lanes));
+  }
 };
 
 class Walker {
@@ -47,27 +54,35 @@ class Walker {
 
   /// Refines those of the entries [begin, end) for whose points `asked` is not 0: Chart::look.
   HWY_NOINLINE void refine(std::uint32_t begin, std::uint32_t end, const std::int32_t* asked) noexcept {
+    EntryList aside;
     for (std::uint32_t i = begin; i < end; i += lane_count()) {
       const VI wished = hn::GatherIndex(kDI, asked, hn::LoadU(kDI, entries_.point + i));
       const M wanted = hn::And(hn::FirstN(kD, end - i), as_float(hn::Gt(wished, hn::Zero(kDI))));
-      if (!none(wanted)) set_out(i, wanted);
+      if (!none(wanted)) set_out(i, wanted, aside);
     }
+    set_out_strays(aside);
     go_on();
     if (fans_.count > 0) fans();
-    set_out_again(begin, end);
+    set_out_again(begin, end, aside);
   }
 
  private:
   static constexpr int kFirstSteps = 2;
-  static constexpr std::int32_t kNobody = kMostEntries;  // an entry that nobody reads
+  static constexpr std::uint32_t kNobody = kMostEntries;  // an entry that nobody reads
 
   HWY_INLINE void solve(Walk& walk, const VPatch& patch, const V3& error, M lanes) const noexcept;
   HWY_INLINE M advance(Walk& walk, VCell& cell, M active) const noexcept;
+  /// Lanes whose next step is not worth its while.
+  HWY_INLINE M is_over(const Walk& walk) const noexcept {
+    const float least_gain = kLeastGain * part_.depth_step;
+    return hn::Or(hn::Lt(hn::Abs(walk.d_row) + hn::Abs(walk.d_col), all(kLeastCellStep)),
+                  hn::Lt(walk.gain * walk.gain, all(least_gain * least_gain) * walk.square));
+  }
   SQMAP_KERNEL Walk begin(const V3& p, V row, V col, VCell& cell, M& eligible) const noexcept;
-  HWY_INLINE void replace(M lanes, Walk& by, const VCell& by_cell, Walk& walk, VCell& cell) const noexcept;
-  HWY_NOINLINE M find_beside(const V3& p, M lanes, V& row, V& col) const noexcept;
-  HWY_NOINLINE void set_out(std::uint32_t i, M wanted) noexcept;
-  HWY_NOINLINE void set_out_again(std::uint32_t begin, std::uint32_t end) noexcept;
+  HWY_NOINLINE V find_beside(const V3& p, M lanes, V& row, V& col) const noexcept;
+  HWY_NOINLINE void set_out(std::uint32_t i, M wanted, EntryList& strays) noexcept;
+  HWY_NOINLINE void set_out_strays(const EntryList& strays) noexcept;
+  HWY_NOINLINE void set_out_again(std::uint32_t begin, std::uint32_t end, EntryList& remote) noexcept;
   HWY_INLINE void go(Walk& walk, VCell& cell, VI entry, M lanes) noexcept;
   HWY_NOINLINE void go_on() noexcept;
   HWY_NOINLINE void keep(Walk& walk, VI entry, M lanes) noexcept;
@@ -83,7 +98,8 @@ class Walker {
   Entries& entries_;
   Pending pending_;
   Fans fans_;
-  bool must_be_nearer_ = false;  ///< what is written must be nearer than what is known
+  bool must_be_nearer_ = false;             ///< what is written must be nearer than what is known
+  std::uint32_t first_in_a_row_ = kNobody;  ///< what is written are entries in a row from here; kNobody: not
 };
 
 /// Chart::step_towards, for some lanes.
@@ -104,8 +120,11 @@ HWY_INLINE void Walker::solve(Walk& walk, const VPatch& patch, const V3& error, 
         hn::Sqrt(a / most(most(c, all(kLeastAngle) * a), all(std::numeric_limits<float>::min())));
     most_col = least(all(looker_.turn() * 0.125F), most_row * most(slimness, one));
   }
-  walk.d_row = pick(lanes, limited(d_row, hn::Neg(most_row), most_row), walk.d_row);
-  walk.d_col = pick(lanes, limited(d_col, hn::Neg(most_col), most_col), walk.d_col);
+  const V short_row = limited(d_row, hn::Neg(most_row), most_row);
+  const V short_col = limited(d_col, hn::Neg(most_col), most_col);
+  walk.d_row = pick(lanes, short_row, walk.d_row);
+  walk.d_col = pick(lanes, short_col, walk.d_col);
+  walk.gain = pick(lanes, f * short_row + g * short_col, walk.gain);
 }
 
 /// `eligible`: the lanes whose cell bounds a patch; the others' walks mean nothing.
@@ -123,7 +142,7 @@ SQMAP_KERNEL Walk Walker::begin(const V3& p, V row, V col, VCell& cell, M& eligi
   walk.cell_col = cell.col;
   walk.point = patch.point;
   walk.normal = cross3(patch.col, patch.row);
-  walk.on_rim = walk.d_row = walk.d_col = hn::Zero(kD);
+  walk.on_rim = walk.d_row = walk.d_col = walk.gain = hn::Zero(kD);
   const M everyone = hn::Eq(walk.on_rim, walk.on_rim);
   solve(walk, patch, error, everyone);
   return walk;
@@ -132,7 +151,7 @@ SQMAP_KERNEL Walk Walker::begin(const V3& p, V row, V col, VCell& cell, M& eligi
 /// One step of the active lanes; those that are not over. `cell` is that of (row, col).
 HWY_INLINE M Walker::advance(Walk& walk, VCell& cell, M active) const noexcept {
   const V zero = hn::Zero(kD), one = all(1.0F), least_step = all(kLeastCellStep), size = all(looker_.size());
-  active = hn::AndNot(hn::Lt(hn::Abs(walk.d_row) + hn::Abs(walk.d_col), least_step), active);
+  active = hn::AndNot(is_over(walk), active);
   if (none(active)) return active;
   V next_row = limited(walk.row + walk.d_row, zero, all(looker_.last_row()));
   const V moved = walk.col + walk.d_col;
@@ -181,19 +200,9 @@ HWY_INLINE M Walker::advance(Walk& walk, VCell& cell, M active) const noexcept {
   if (wants_.normal) walk.normal = pick(better, cross3(patch.col, patch.row), walk.normal);
   walk.d_row = walk.d_row * all(kBackStep);
   walk.d_col = walk.d_col * all(kBackStep);
+  walk.gain = walk.gain * all(kBackStep);
   solve(walk, patch, error, better);
   return active;
-}
-
-HWY_INLINE void Walker::replace(M lanes, Walk& by, const VCell& by_cell, Walk& walk,
-                                VCell& cell) const noexcept {
-  V *to[kWalkFields], *from[kWalkFields];
-  fields_of(walk, to);
-  fields_of(by, from);
-  for (int k = 0; k < kWalkFields; ++k) *to[k] = pick(lanes, *from[k], *to[k]);
-  walk.cell_row = cell.row = pick(lanes, by_cell.row, cell.row);
-  walk.cell_col = cell.col = pick(lanes, by_cell.col, cell.col);
-  for (int k = 0; k < 4; ++k) cell.depth[k] = pick(lanes, by_cell.depth[k], cell.depth[k]);
 }
 
 HWY_INLINE void Walker::go(Walk& walk, VCell& cell, VI entry, M lanes) noexcept {
@@ -203,7 +212,7 @@ HWY_INLINE void Walker::go(Walk& walk, VCell& cell, VI entry, M lanes) noexcept 
     if (none(active)) break;
   }
   // Lanes that advance() would end at once are over, too.
-  active = hn::AndNot(hn::Lt(hn::Abs(walk.d_row) + hn::Abs(walk.d_col), all(kLeastCellStep)), active);
+  active = hn::AndNot(is_over(walk), active);
   const M over = hn::AndNot(active, lanes);
   if (!none(active)) keep(walk, entry, active);
   if (!none(over)) end(walk, entry, over);
@@ -245,8 +254,9 @@ HWY_NOINLINE void Walker::go_on() noexcept {
   pending_.count = 0;
 }
 
-/// Chart::start_beside, which moves (row, col). The lanes that found a start.
-HWY_NOINLINE M Walker::find_beside(const V3& p, M lanes, V& row, V& col) const noexcept {
+/// Chart::start_beside, which moves (row, col): how far from the start, squared; infinite where there is
+/// none.
+HWY_NOINLINE V Walker::find_beside(const V3& p, M lanes, V& row, V& col) const noexcept {
   const V half = all(looker_.size() / 2), zero = hn::Zero(kD);
   const VCell middle = looker_.cell_at(row, col);
   const V mid_row = to_float(middle.row) + half, mid_col = to_float(middle.col) + half;
@@ -274,69 +284,100 @@ HWY_NOINLINE M Walker::find_beside(const V3& p, M lanes, V& row, V& col) const n
     }
     seeking = hn::AndNot(hn::Lt(best, infinity), seeking);
   }
-  return hn::And(lanes, hn::Lt(best, infinity));
+  return best;
 }
 
-/// From the foot or, where that is nearer to an inner point, from where the table of starts says.
-HWY_NOINLINE void Walker::set_out(std::uint32_t i, M wanted) noexcept {
-  const VI flags = hn::LoadU(kDI, entries_.flags + i), start = hn::LoadU(kDI, entries_.start + i);
+/// From the foot. Inner points that have no patch there are set aside.
+HWY_NOINLINE void Walker::set_out(std::uint32_t i, M wanted, EntryList& strays) noexcept {
+  const VI flags = hn::LoadU(kDI, entries_.flags + i), entry = hn::Iota(kDI, static_cast<std::int32_t>(i));
   const auto has = [&](std::int32_t flag) HWY_ATTR {
     return as_float(hn::Ne(hn::And(flags, all_int(static_cast<std::uint32_t>(flag))), hn::Zero(kDI)));
   };
-  const M at_foot = hn::And(wanted, has(kPatch));
-  const V3 p = load3(entries_.x, entries_.y, entries_.z, i);
-  V row = hn::LoadU(kD, entries_.other_row + i), col = hn::LoadU(kD, entries_.other_col + i);
-  const M inside = hn::And(wanted, has(kInside));
-  const M stray = hn::AndNot(at_foot, inside);
-  M lanes = at_foot;
-  if (!none(stray)) lanes = hn::Or(lanes, find_beside(p, stray, row, col));
+  const M at_foot = hn::And(wanted, has(kPatch)), inside = hn::And(wanted, has(kInside));
+  strays.append(entry, hn::AndNot(at_foot, inside));
+  if (none(at_foot)) return;
+  const V row = hn::LoadU(kD, entries_.other_row + i), col = hn::LoadU(kD, entries_.other_col + i);
+  const M other = hn::And(at_foot, inside);
+  if (!none(other)) {
+    const VI start = hn::LoadU(kDI, entries_.start + i);
+    const M named = hn::And(other, as_float(hn::Ne(start, all_int(StartTable::kNone))));
+    hn::StoreU(pick(named, looker_.start_row(start), row), kD, entries_.other_row + i);
+    hn::StoreU(pick(named, looker_.start_col(start), col), kD, entries_.other_col + i);
+    hn::StoreU(hn::Or(flags, pick(named, all_int(kOther), hn::Zero(kDI))), kDI, entries_.flags + i);
+  }
   VCell cell;
   M eligible;
-  Walk walk = begin(p, row, col, cell, eligible);
-  const M named = hn::And(inside, as_float(hn::Ne(start, all_int(StartTable::kNone))));
-  if (!none(named)) {
+  Walk walk = begin(load3(entries_.x, entries_.y, entries_.z, i), row, col, cell, eligible);
+  first_in_a_row_ = i;
+  go(walk, cell, entry, at_foot);
+  first_in_a_row_ = kNobody;
+}
+
+/// Beside the foot or, where that is nearer, from where the table of starts says.
+HWY_NOINLINE void Walker::set_out_strays(const EntryList& strays) noexcept {
+  const V infinity = all(std::numeric_limits<float>::infinity());
+  for (std::uint32_t i = 0; i < strays.count; i += lane_count()) {
+    const M wanted = hn::FirstN(kD, strays.count - i);
+    const VI entry = pick(wanted, hn::LoadU(kDI, strays.entry + i), all_int(kNobody));
+    const auto field = [&](const float* values) HWY_ATTR {
+      return hn::IfThenElseZero(wanted, hn::GatherIndex(kD, values, entry));
+    };
+    const V3 p{field(entries_.x), field(entries_.y), field(entries_.z)};
+    V row = field(entries_.other_row), col = field(entries_.other_col);
+    const V square = find_beside(p, wanted, row, col);
+    const M beside = hn::And(wanted, hn::Lt(square, infinity));
+    M lanes = beside;
+    const VI none_known = all_int(StartTable::kNone);
+    const VI start = pick(wanted, hn::GatherIndex(kDI, entries_.start, entry), none_known);
+    const M named = as_float(hn::Ne(start, none_known));
     const VI place = pick(named, start, hn::Zero(kDI));
-    const V there_row = looker_.start_place(hn::ShiftRight<8>(place));
-    const V there_col = looker_.start_place(hn::And(place, all_int(255)));
-    VCell there;
-    Walk from_there = begin(p, there_row, there_col, there, eligible);
-    const M open = hn::And(named, eligible);
-    const M both = hn::And(open, lanes);
-    const M nearer = hn::AndNot(hn::AndNot(hn::Lt(from_there.square, walk.square), both), open);
-    hn::StoreU(pick(nearer, row, there_row), kD, entries_.other_row + i);
-    hn::StoreU(pick(nearer, col, there_col), kD, entries_.other_col + i);
-    hn::StoreU(hn::Or(flags, pick(both, all_int(kOther), hn::Zero(kDI))), kDI, entries_.flags + i);
-    replace(nearer, from_there, there, walk, cell);
-    lanes = hn::Or(lanes, open);
+    const V there_row = looker_.start_row(place), there_col = looker_.start_col(place);
+    VCell there = looker_.cell_at(there_row, there_col);
+    const M open = hn::And(named, looker_.read(there).eligible);
+    if (!none(open)) {
+      const V3 error = p - looker_.patch_at(there, there_row, there_col).point;
+      const M nearer = hn::And(open, hn::Lt(dot3(error, error), square));
+      const M both = hn::And(open, beside);
+      const VI other = pick(both, entry, all_int(kNobody));
+      hn::ScatterIndex(pick(nearer, row, there_row), kD, entries_.other_row, other);
+      hn::ScatterIndex(pick(nearer, col, there_col), kD, entries_.other_col, other);
+      hn::ScatterIndex(hn::Or(hn::GatherIndex(kDI, entries_.flags, other), all_int(kOther)), kDI,
+                       entries_.flags, other);
+      row = pick(nearer, there_row, row);
+      col = pick(nearer, there_col, col);
+      lanes = hn::Or(lanes, nearer);
+    }
+    if (none(lanes)) continue;
+    VCell cell;
+    M eligible;
+    Walk walk = begin(p, row, col, cell, eligible);
+    go(walk, cell, entry, lanes);
   }
-  if (!none(lanes)) go(walk, cell, hn::Iota(kDI, static_cast<std::int32_t>(i)), lanes);
 }
 
 /// From the other start, for points that are far from the surface that was found.
-HWY_NOINLINE void Walker::set_out_again(std::uint32_t begin, std::uint32_t end) noexcept {
+HWY_NOINLINE void Walker::set_out_again(std::uint32_t begin, std::uint32_t end, EntryList& remote) noexcept {
   const V far = all(Chart::far_from(part_, looker_.stride()));
-  Remote remote;
+  remote.count = 0;
   for (std::uint32_t i = begin; i < end; i += lane_count()) {
     const VI other = hn::And(hn::LoadU(kDI, entries_.flags + i), all_int(kOther));
     M is_far = hn::And(as_float(hn::Ne(other, hn::Zero(kDI))), hn::FirstN(kD, end - i));
     is_far = hn::And(is_far, hn::Gt(hn::LoadU(kD, entries_.distance + i), far));
-    if (none(is_far)) continue;
-    const VI entry = hn::Iota(kDI, static_cast<std::int32_t>(i));
-    hn::StoreU(hn::Compress(entry, hn::RebindMask(kDI, is_far)), kDI, remote.entry + remote.count);
-    remote.count += static_cast<std::uint32_t>(hn::CountTrue(kD, is_far));
+    remote.append(hn::Iota(kDI, static_cast<std::int32_t>(i)), is_far);
   }
   if (remote.count == 0) return;
   must_be_nearer_ = true;
   for (std::uint32_t i = 0; i < remote.count; i += lane_count()) {
     const M lanes = hn::FirstN(kD, remote.count - i);
-    const VI entry = pick(lanes, hn::LoadU(kDI, remote.entry + i), hn::Set(kDI, kNobody));
+    const VI entry = pick(lanes, hn::LoadU(kDI, remote.entry + i), all_int(kNobody));
     const auto field = [&](const float* values)
                            HWY_ATTR { return hn::IfThenElseZero(lanes, hn::GatherIndex(kD, values, entry)); };
     VCell cell;
     M eligible;
     Walk walk = this->begin({field(entries_.x), field(entries_.y), field(entries_.z)},
                             field(entries_.other_row), field(entries_.other_col), cell, eligible);
-    go(walk, cell, entry, lanes);
+    const M open = hn::And(lanes, eligible);
+    if (!none(open)) go(walk, cell, entry, open);
   }
   go_on();
   if (fans_.count > 0) fans();
@@ -359,7 +400,7 @@ HWY_NOINLINE void Walker::end(const Walk& walk, VI entry, M lanes) noexcept {
       looker_.read(cell);
       normal = pick(beside_pole, looker_.patch_normal(cell, walk.row, walk.col), normal);
     }
-    const VI flags = hn::GatherIndex(kDI, entries_.flags, pick(lanes, entry, hn::Set(kDI, kNobody)));
+    const VI flags = hn::GatherIndex(kDI, entries_.flags, pick(lanes, entry, all_int(kNobody)));
     const M inside = as_float(hn::Ne(hn::And(flags, all_int(kInside)), hn::Zero(kDI)));
     const V3 out = pick(inside, walk.point - walk.p, walk.p - walk.point);
     M turned = hn::Lt(dot3(out, normal), all(kBack) * distance);
@@ -371,29 +412,39 @@ HWY_NOINLINE void Walker::end(const Walk& walk, VI entry, M lanes) noexcept {
 
 HWY_INLINE void Walker::write(VI entry, M lanes, V row, V col, V on_rim, V distance, const V3& surface,
                               const V3& normal) noexcept {
-  const VI nobody = hn::Set(kDI, kNobody), at = pick(lanes, entry, nobody);
+  const VI nobody = all_int(kNobody), at = pick(lanes, entry, nobody);
   const VI flags = hn::GatherIndex(kDI, entries_.flags, at);
   // A crossing that is on no patch stands where it is nearer.
   M has_rival = as_float(hn::Ne(hn::And(flags, all_int(kPoint)), hn::Zero(kDI)));
   if (must_be_nearer_) has_rival = lanes;
-  VI to = at;
   if (!none(hn::And(lanes, has_rival))) {
     const V known = hn::GatherIndex(kD, entries_.distance, at);
-    to = pick(hn::AndNot(hn::Lt(distance, known), has_rival), nobody, at);
+    lanes = hn::AndNot(hn::AndNot(hn::Lt(distance, known), has_rival), lanes);
   }
   const VI faces = pick(hn::Gt(on_rim, hn::Zero(kD)), hn::Zero(kDI), all_int(kFaces));
   const VI others = hn::AndNot(all_int(kFaces), flags);
-  hn::ScatterIndex(hn::Or(hn::Or(others, faces), all_int(kRefined | kPatch)), kDI, entries_.flags, to);
-  hn::ScatterIndex(distance, kD, entries_.distance, to);
-  hn::ScatterIndex(row, kD, entries_.row, to);
-  hn::ScatterIndex(col, kD, entries_.col, to);
-  if (wants_.surface) {
-    hn::ScatterIndex(surface.x, kD, entries_.surface[0], to);
-    hn::ScatterIndex(surface.y, kD, entries_.surface[1], to);
-    hn::ScatterIndex(surface.z, kD, entries_.surface[2], to);
+  const VI new_flags = hn::Or(hn::Or(others, faces), all_int(kRefined | kPatch));
+  const auto put_all = [&](auto put) HWY_ATTR {
+    put(new_flags, kDI, entries_.flags);
+    put(distance, kD, entries_.distance);
+    put(row, kD, entries_.row);
+    put(col, kD, entries_.col);
+    if (wants_.surface) {
+      put(surface.x, kD, entries_.surface[0]);
+      put(surface.y, kD, entries_.surface[1]);
+      put(surface.z, kD, entries_.surface[2]);
+    }
+    if (!wants_.normal) return;
+    put(normal.x, kD, entries_.normal[0]);
+    put(normal.y, kD, entries_.normal[1]);
+    put(normal.z, kD, entries_.normal[2]);
+  };
+  if (first_in_a_row_ < kNobody) {  // a scattering store costs as much as a lane each
+    put_all([&](auto value, auto tag, auto* values) HWY_ATTR {
+      hn::BlendedStore(value, hn::RebindMask(tag, lanes), tag, values + first_in_a_row_);
+    });
+  } else {
+    const VI to = pick(lanes, at, nobody);
+    put_all([&](auto value, auto tag, auto* values) HWY_ATTR { hn::ScatterIndex(value, tag, values, to); });
   }
-  if (!wants_.normal) return;
-  hn::ScatterIndex(normal.x, kD, entries_.normal[0], to);
-  hn::ScatterIndex(normal.y, kD, entries_.normal[1], to);
-  hn::ScatterIndex(normal.z, kD, entries_.normal[2], to);
 }
