@@ -34,8 +34,8 @@ struct Model {
   void find_box();
 
   mutable std::map<unsigned, std::shared_ptr<const Field>> fields;
-  /// Corners of each convex hull, by the least number of hulls: computed once, as it takes up to minutes.
-  mutable std::map<std::size_t, std::vector<std::vector<Vec3d>>> hulls;
+  /// Convex hulls, by the least number of them: computed once, as it takes up to minutes.
+  mutable std::map<std::size_t, std::vector<bake::Mesh>> hulls;
 };
 
 /// Reads `mesh` and `bundles`/STEM.h5. Errors: those of the two readers, and kBadOption where the bundle was

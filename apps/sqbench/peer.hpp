@@ -10,7 +10,9 @@
 #include <functional>
 #include <limits>
 #include <memory>
+#include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "cloud.hpp"
@@ -39,6 +41,9 @@ class Peer {
   /// Of the points that lie inside a superquadric, the share whose foot on it is more than kWrongFoot farther
   /// away than the nearest. NaN: the method has no feet. Searches exhaustively: slow.
   virtual double wrong_feet_percent(const Cloud&) const { return std::numeric_limits<double>::quiet_NaN(); }
+  /// The solids whose union the method took for the object, to hold its answers against. Empty: it took the
+  /// mesh.
+  virtual std::span<const bake::Mesh> stands_for() const { return {}; }
   virtual double field_s() const { return 0; }  ///< time of the exact field it was made from, if any
 };
 
@@ -53,20 +58,30 @@ struct Entrant {
   unsigned density = 0;  ///< samples along an axis: nodes of a grid, rows of a map; 0: not its setting
 };
 
+/// A face of the object and one of the probe.
+using FacePair = std::pair<std::uint32_t, std::uint32_t>;
+
 /// A method that tells which triangles of the probe and the object cross.
 class ContactPeer {
  public:
   virtual ~ContactPeer() = default;
   virtual std::size_t contacts(const Placement& object_from_probe) const = 0;
+  /// Which pairs it told, sorted, for methods that tell several contacts of a pair, and pairs that do not
+  /// cross. False: as many as contacts() says, and only those that cross.
+  virtual bool pairs(const Placement&, std::vector<FacePair>& /*told*/) const { return false; }
   virtual std::size_t bytes() const = 0;  ///< of the object's side
 };
 enum class FclTree { kObb, kKdop18 };
 std::unique_ptr<ContactPeer> make_fcl(const Model& model, const bake::Mesh& probe, FclTree tree,
                                       bool first_contact_only);
 std::unique_ptr<ContactPeer> make_gimpact(const Model& model, const bake::Mesh& probe);
-/// The same number by testing every pair.
-std::size_t count_crossing_pairs(const Model& model, const bake::Mesh& probe,
-                                 const Placement& object_from_probe);
+/// The same by testing every pair; sorted.
+std::vector<FacePair> crossing_pairs(const Model& model, const bake::Mesh& probe,
+                                     const Placement& object_from_probe);
+/// How many of these pairs neither cross nor are near each other, each with a corner behind the other: all
+/// that a method may tell that takes the faces of a mesh for the skin of a solid.
+std::size_t count_strays(const std::vector<FacePair>& pairs, const Model& model, const bake::Mesh& probe,
+                         const Placement& object_from_probe);
 
 /// The method that ratios refer to: a plain and strong rival.
 inline constexpr const char* kReference = "grid-int16-128-simd";
@@ -85,8 +100,8 @@ std::unique_ptr<Peer> make_paper(const Model& model, unsigned rows, unsigned col
 std::unique_ptr<Peer> make_embree(const Model& model);
 std::unique_ptr<Peer> make_cgal(const Model& model);
 
-/// The methods of the suites. `smoke`: a few of each kind.
-std::vector<Entrant> frame_entrants(bool smoke);
+/// The methods of the suites. `smoke`: a few of each kind, without what takes minutes to prepare.
+std::vector<Entrant> frame_entrants(const Model& model, bool smoke);
 std::vector<Entrant> accuracy_entrants(const Model& model, bool smoke);
 
 }  // namespace sqmap::bench

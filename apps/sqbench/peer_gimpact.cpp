@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
 // Bullet's triangle meshes that move, GImpact: trees of boxes with quantised bounds.
+#include <algorithm>
+#include <cstdint>
 #include <memory>
 #include <vector>
 
@@ -37,8 +39,19 @@ class Counter : public btManifoldResult {
   using btManifoldResult::btManifoldResult;
   void addContactPoint(const btVector3& /*normal*/, const btVector3& /*point*/, btScalar /*depth*/) override {
     ++count;
+    if (told != nullptr) told->emplace_back(one_, other_);
+  }
+  void setShapeIdentifiersA(int /*part*/, int triangle) override {
+    one_ = static_cast<std::uint32_t>(triangle);
+  }
+  void setShapeIdentifiersB(int /*part*/, int triangle) override {
+    other_ = static_cast<std::uint32_t>(triangle);
   }
   std::size_t count{};
+  std::vector<FacePair>* told = nullptr;  ///< where to note them; a mesh has one part
+
+ private:
+  std::uint32_t one_{}, other_{};
 };
 
 class GImpactPeer : public ContactPeer {
@@ -55,18 +68,13 @@ class GImpactPeer : public ContactPeer {
   GImpactPeer(const GImpactPeer&) = delete;
   GImpactPeer& operator=(const GImpactPeer&) = delete;
 
-  std::size_t contacts(const Placement& placement) const override {
-    btTransform pose;
-    const auto& row = placement.rotation.row;
-    pose.getBasis().setValue(row[0].x, row[0].y, row[0].z, row[1].x, row[1].y, row[1].z, row[2].x, row[2].y,
-                             row[2].z);
-    pose.setOrigin({placement.translation_m.x, placement.translation_m.y, placement.translation_m.z});
-    probe_.object.setWorldTransform(pose);
-    // btCollisionWorld::contactPairTest would ask for an algorithm of closest points, which GImpact has not.
-    const btCollisionObjectWrapper one = wrapped(object_), other = wrapped(probe_);
-    Counter counter(&one, &other);
-    algorithm_->processCollision(&one, &other, dispatch_, &counter);
-    return counter.count;
+  std::size_t contacts(const Placement& placement) const override { return collide(placement, nullptr); }
+  bool pairs(const Placement& placement, std::vector<FacePair>& told) const override {
+    told.clear();
+    collide(placement, &told);
+    std::sort(told.begin(), told.end());
+    told.erase(std::unique(told.begin(), told.end()), told.end());
+    return true;
   }
   std::size_t bytes() const override {
     std::size_t sum = sizeof(Body);
@@ -79,6 +87,20 @@ class GImpactPeer : public ContactPeer {
   }
 
  private:
+  std::size_t collide(const Placement& placement, std::vector<FacePair>* told) const {
+    btTransform pose;
+    const auto& row = placement.rotation.row;
+    pose.getBasis().setValue(row[0].x, row[0].y, row[0].z, row[1].x, row[1].y, row[1].z, row[2].x, row[2].y,
+                             row[2].z);
+    pose.setOrigin({placement.translation_m.x, placement.translation_m.y, placement.translation_m.z});
+    probe_.object.setWorldTransform(pose);
+    // btCollisionWorld::contactPairTest would ask for an algorithm of closest points, which GImpact has not.
+    const btCollisionObjectWrapper one = wrapped(object_), other = wrapped(probe_);
+    Counter counter(&one, &other);
+    counter.told = told;
+    algorithm_->processCollision(&one, &other, dispatch_, &counter);
+    return counter.count;
+  }
   static btCollisionObjectWrapper wrapped(const Body& body) {
     return {nullptr, body.shape.get(), &body.object, body.object.getWorldTransform(), -1, -1};
   }

@@ -6,7 +6,11 @@
 #include "peer_hulls.hpp"
 
 #include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
 #include <limits>
+#include <utility>
 #include <vector>
 
 #include <BulletCollision/CollisionShapes/btConvexHullShape.h>
@@ -15,6 +19,8 @@
 #include <HACD/hacdHACD.h>
 
 #include "exact_answer.hpp"
+#include "union_oracle.hpp"
+#include "work.hpp"
 
 namespace sqmap::bench {
 namespace {
@@ -35,8 +41,7 @@ float height_m(const btFace& face, const btVector3& p_m) {
 
 btVector3 bullet(const Vec3f& p) { return {p.x, p.y, p.z}; }
 
-/// Corners of the hulls, a vector each.
-std::vector<std::vector<Vec3d>> decomposed(const bake::Mesh& mesh, std::size_t least_hulls) {
+std::vector<bake::Mesh> decomposed(const bake::Mesh& mesh, std::size_t least_hulls) {
   std::vector<HACD::Vec3<HACD::Real>> points;
   std::vector<HACD::Vec3<long>> faces;
   for (const Vec3d& v : mesh.vertices_m) points.emplace_back(v.x, v.y, v.z);
@@ -64,41 +69,42 @@ std::vector<std::vector<Vec3d>> decomposed(const bake::Mesh& mesh, std::size_t l
   const auto placed = [&](std::size_t k) { return Vec3d{points[k].X(), points[k].Y(), points[k].Z()}; };
   const double unit_m =
       (mesh.vertices_m[other].x - mesh.vertices_m[one].x) / (placed(other).x - placed(one).x);
-  std::vector<std::vector<Vec3d>> hulls;
+  std::vector<bake::Mesh> hulls;
   for (std::size_t k = 0; k < hacd.GetNClusters(); ++k) {
     std::vector<HACD::Vec3<HACD::Real>> corners(hacd.GetNPointsCH(k));
     std::vector<HACD::Vec3<long>> triangles(hacd.GetNTrianglesCH(k));
     hacd.GetCH(k, corners.data(), triangles.data());
     hulls.emplace_back();
     for (const auto& p : corners)
-      hulls.back().push_back(mesh.vertices_m[one] + unit_m * (Vec3d{p.X(), p.Y(), p.Z()} - placed(one)));
+      hulls.back().vertices_m.push_back(mesh.vertices_m[one] +
+                                        unit_m * (Vec3d{p.X(), p.Y(), p.Z()} - placed(one)));
+    bake::Mesh& hull = hulls.back();
+    Vec3d middle_m;
+    for (const Vec3d& v : hull.vertices_m)
+      middle_m = middle_m + (1.0 / static_cast<double>(corners.size())) * v;
+    for (const auto& triangle : triangles) {
+      std::array<std::uint32_t, 3> face{static_cast<std::uint32_t>(triangle.X()),
+                                        static_cast<std::uint32_t>(triangle.Y()),
+                                        static_cast<std::uint32_t>(triangle.Z())};
+      const Vec3d &a = hull.vertices_m[face[0]], &b = hull.vertices_m[face[1]], &c = hull.vertices_m[face[2]];
+      if (dot(cross(b - a, c - a), a - middle_m) < 0) std::swap(face[1], face[2]);  // outwards
+      hull.faces.push_back(face);
+    }
+    hull.source_face.assign(hull.faces.size(), bake::kNewFace);
   }
   return hulls;
-}
-
-/// No ball in the hull is larger: half the least width between a face and the corner farthest from it.
-float most_depth_m(const btConvexPolyhedron& solid) {
-  float least_m = std::numeric_limits<float>::infinity();
-  for (int k = 0; k < solid.m_faces.size(); ++k) {
-    float width_m = 0;
-    for (int v = 0; v < solid.m_vertices.size(); ++v)
-      width_m = std::max(width_m, -height_m(solid.m_faces[k], solid.m_vertices[v]));
-    least_m = std::min(least_m, width_m);
-  }
-  return least_m / 2;
 }
 
 class HullsPeer : public Peer {
  public:
   HullsPeer(const Model& model, std::size_t least_hulls)
       : near_(model), band_m_(static_cast<float>(kBand * model.r_max_m())) {
-    float deepest_m = band_m_;
     auto& hulls = model.hulls[least_hulls];
     if (hulls.empty()) hulls = decomposed(model.mesh, least_hulls);
-    for (const std::vector<Vec3d>& corners : hulls) {
-      Hull hull{std::make_unique<btConvexHullShape>(), cast<float>(corners.front()),
-                cast<float>(corners.front())};
-      for (const Vec3d& corner : corners) {
+    for (const bake::Mesh& mesh : hulls) {
+      Hull hull{std::make_unique<btConvexHullShape>(), cast<float>(mesh.vertices_m.front()),
+                cast<float>(mesh.vertices_m.front())};
+      for (const Vec3d& corner : mesh.vertices_m) {
         const Vec3f p = cast<float>(corner);
         hull.shape->addPoint(bullet(p), false);
         for (int axis = 0; axis < 3; ++axis) {
@@ -109,11 +115,10 @@ class HullsPeer : public Peer {
       hull.shape->setMargin(0);
       hull.shape->recalcLocalAabb();
       if (!hull.shape->initializePolyhedralFeatures()) continue;  // flat: nothing can be inside
-      deepest_m = std::max(deepest_m, most_depth_m(*hull.shape->getConvexPolyhedron()));
       hulls_.push_back(std::move(hull));
+      meshes_.push_back(mesh);
     }
-    // Of a point within the band they tell at most the band outside, and inside no more than fits a hull.
-    stated_percent_ = 100 * (band_m_ + deepest_m) / model.r_max_m();
+    stated_percent_ = kSampleMargin * own_error_percent(model) + 1e-3;
   }
 
   void answer(const Cloud& cloud, const Placement& placement, Hits& hits) const override {
@@ -139,9 +144,25 @@ class HullsPeer : public Peer {
     }
     return sum;
   }
-  StatedError stated_error() const override { return {stated_percent_, false}; }
+  StatedError stated_error() const override { return {stated_percent_, true}; }
+  std::span<const bake::Mesh> stands_for() const override { return meshes_; }
 
  private:
+  /// What the hulls themselves are off, by exact distances to their meshes: no line of this is Bullet's.
+  double own_error_percent(const Model& model) const {
+    const Shell shell = make_shell(model, kOwnShell, 1000);
+    const UnionOracle exact(meshes_);
+    double sum_m = 0;
+    std::size_t count = 0;
+    for (std::size_t i = 0; i < shell.points_m.size(); ++i) {
+      const double told_m = exact.signed_distance(shell.points_m[i]);
+      if (told_m > kBand * model.r_max_m()) continue;
+      sum_m += std::abs(told_m - shell.distance_m[i]);
+      ++count;
+    }
+    return 100 * sum_m / (static_cast<double>(std::max<std::size_t>(count, 1)) * model.r_max_m());
+  }
+
   /// Lowers `deepest_m` to the signed distance to the hull if that is less.
   static void ask(const btConvexHullShape& hull, const btVector3& p_m, float& deepest_m, btVector3& normal) {
     const btConvexPolyhedron& solid = *hull.getConvexPolyhedron();
@@ -172,6 +193,7 @@ class HullsPeer : public Peer {
   NearBox near_;
   float band_m_;
   double stated_percent_{};
+  std::vector<bake::Mesh> meshes_;  // for the checks; no query reads them
 };
 
 }  // namespace

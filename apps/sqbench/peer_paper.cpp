@@ -24,7 +24,6 @@ namespace {
 
 constexpr float kPi = std::numbers::pi_v<float>;
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
-constexpr double kOwnShell = 0.028;  ///< of R_max; as the band, but other points than the suite draws
 
 /// The faces of one part, closed: each connected run of open edges gets a fan around the mean of its
 /// vertices.
@@ -321,9 +320,9 @@ class PaperPeer : public Peer {
     double sum_m = 0;
     for (std::size_t i = 0; i < hits.count; ++i)
       sum_m += std::abs(hits.distance_m[i] - shell.distance_m[cloud.source[hits.point[i]]]);
-    stated_percent_ =
-        1.5 * 100 * sum_m / (static_cast<double>(std::max<std::size_t>(hits.count, 1)) * model.r_max_m()) +
-        1e-3;
+    stated_percent_ = kSampleMargin * 100 * sum_m /
+                          (static_cast<double>(std::max<std::size_t>(hits.count, 1)) * model.r_max_m()) +
+                      1e-3;
   }
 
   std::vector<PaperPart> parts_;

@@ -13,12 +13,65 @@
 #include "peer_rows.hpp"
 #include "suites.hpp"
 #include "timing.hpp"
+#include "union_oracle.hpp"
 #include "work.hpp"
 
 namespace sqmap::bench {
 namespace {
 
+constexpr double kUncovered_percent = 1;   ///< HACD leaves out corners of its hulls
+constexpr double kStandIn_percent = 0.02;  ///< Bullet takes faces for one whose normals differ by 2.5 degrees
 constexpr double kNormalFrom = 0.001;  ///< of R_max: closer to the surface a direction is decided by rounding
+
+/// Where solids stand for the mesh: the answers must be distances to them, and the mesh lie in them.
+void check_stand_in(const Model& model, const BuiltPeer& built, const Shell& shell, const Cloud& cloud,
+                    const Hits& hits, Results& results) {
+  const UnionOracle solids(built.peer->stands_for());
+  constexpr std::size_t kSampled = 1000;
+  double error_m = 0, swapped_error_m = 0, out_m = 0, count = 0;
+  for (std::size_t i = 0; i < hits.count; i += hits.count / kSampled + 1) {
+    const double exact_m = solids.signed_distance(shell.points_m[cloud.source[hits.point[i]]]);
+    error_m += std::abs(hits.distance_m[i] - exact_m);
+    swapped_error_m += std::abs(hits.distance_m[i] + exact_m);
+    ++count;
+  }
+  for (const Vec3d& v_m : model.mesh.vertices_m) out_m = std::max(out_m, solids.signed_distance(v_m));
+  const auto add = [&](const char* claim, double found_m, double allowed_percent, bool is_control) {
+    const double found = 100 * found_m / model.r_max_m();
+    results.checks.push_back({model.name, built.entrant.id, claim, found, allowed_percent,
+                              (found <= allowed_percent) != is_control});
+  };
+  count = std::max(count, 1.0);
+  add("mean error against what stands for the mesh, percent of R_max", error_m / count, kStandIn_percent,
+      false);
+  add("answers with the sides swapped break it: mean error against what stands for the mesh, percent of "
+      "R_max",
+      swapped_error_m / count, kStandIn_percent, true);
+  add("how far the mesh reaches out of what stands for it, percent of R_max", out_m, kUncovered_percent,
+      false);
+}
+
+/// A stated mean must be one that wrong answers miss: those of the same peer with inside and outside swapped.
+void check_statement(const Model& model, const BuiltPeer& built, const Shell& shell, const Cloud& cloud,
+                     Results& results) {
+  const StatedError stated = built.peer->stated_error();
+  if (!stated.is_mean) return;  // a bound for every point, known without asking one
+  Hits hits(cloud.count);
+  built.peer->answer(cloud, {}, hits);
+  if (!built.peer->stands_for().empty()) {
+    check_stand_in(model, built, shell, cloud, hits, results);
+    return;  // the mean is of what stands for the mesh: it may be as large as the distances themselves
+  }
+  double sum_m = 0;
+  for (std::size_t i = 0; i < hits.count; ++i)
+    sum_m += std::abs(hits.distance_m[i] + shell.distance_m[cloud.source[hits.point[i]]]);
+  const double wrong =
+      100 * sum_m / (static_cast<double>(std::max<std::size_t>(hits.count, 1)) * model.r_max_m());
+  results.checks.push_back(
+      {model.name, built.entrant.id,
+       "answers with the sides swapped break the statement: mean error, percent of R_max", wrong,
+       stated.percent, wrong > stated.percent});
+}
 
 AccuracyRow compare(const Model& model, const BuiltPeer& built, const Shell& shell, const Cloud& cloud,
                     Hits& hits) {
@@ -92,6 +145,7 @@ void run_shell(const SuiteInput& input, const Model& model, const std::vector<Bu
                                 fmt::format("{} distance error in the shell, percent of R_max",
                                             stated.is_mean ? "mean" : "greatest"),
                                 found, stated.percent, found <= stated.percent});
+      check_statement(model, built, shell, cloud, results);
     }
     contestants.push_back({built.entrant.id, [&](std::size_t) {
                              built.peer->answer(cloud, {}, hits);

@@ -211,7 +211,7 @@ void run_force(const SuiteInput& input, Results& results) {
     const auto r_max_m = static_cast<float>(model.r_max_m());
     add("mesh-normals", felt_by_triangles(model, path, false), is_first);
     add("mesh-shaded", felt_by_triangles(model, path, true), is_first);
-    for (const Entrant& entrant : frame_entrants(input.is_smoke))
+    for (const Entrant& entrant : frame_entrants(model, input.is_smoke))
       add(entrant.id, felt_by(*build_peer(entrant, model, results).peer, path),
           is_first && (entrant.id == "sqmap-layer3" || entrant.id == kReference));
     runtime::Smoothing smoothing;

@@ -51,6 +51,9 @@ struct Shell {
   std::vector<double> distance_m;  ///< exact, signed
   std::vector<Vec3d> normal;       ///< exact gradient
 };
+/// Of R_max: the shell of the sample by which a peer states its error; other points than the suites draw.
+inline constexpr double kOwnShell = 0.028;
+inline constexpr double kSampleMargin = 1.25;  ///< for the sample's being another one
 Shell make_shell(const Model& model, double share, std::size_t count);
 
 }  // namespace sqmap::bench

@@ -94,7 +94,7 @@ class SmokeRun(FolderTest):
             return
         out = self.folder / "out"
         meshes = []
-        for name, mesh in (("ball", sphere(4, 1.0)), ("brick", box(2, 1, 1))):
+        for name, mesh in (("ball", sphere(3, 1.0)), ("brick", box(2, 1, 1))):
             self.bake(mesh, name, *ROUGH)
             meshes.append(self.folder / f"{name}.off")
         probe = write_off(self.folder / "probe.off", sphere(3, 0.3))
@@ -132,6 +132,22 @@ class Smoke(SmokeRun):
         self.assertLessEqual({row["peer"] for row in self.results["accuracy"]}, checked)
         self.assertLessEqual({"fcl-obb-all-contacts", "fcl-kdop18-all-contacts", "fcl-kdop18-first-contact",
                               "bullet-gimpact-all-contacts"}, checked)
+
+    def test_checks_of_means_and_pairs_fail_for_wrong_answers(self):
+        # The run itself swaps the sides of each peer's answers, and takes pairs of another pose: both must break.
+        broken = {check["peer"]: check for check in self.results["checks"]
+                  if check["claim"].startswith(("answers with the sides swapped break", "pairs of another pose break"))}
+        for peer in ("bullet-hacd-16", "paper-100x200-layer2", "paper-25x50-layer3", "sqmap-layer3",
+                     "bullet-gimpact-all-contacts"):
+            self.assertGreater(broken[peer]["found"], broken[peer]["allowed"], peer)
+        claims = [check["claim"] for check in self.results["checks"]]
+        for claim, count in (("how far the mesh reaches out of what stands for it, percent of R_max", 2),
+                             ("mean error against what stands for the mesh, percent of R_max", 2),
+                             ("crossing pairs that are not told, touching, percent", 2),
+                             ("pairs of another pose break it: crossing pairs that are not told, touching, percent", 2),
+                             ("told pairs that are not near each other, touching, percent", 2)):
+            self.assertEqual(claims.count(claim), count, claim)
+
 
     def test_grids_answer_every_point_of_the_shells(self):
         for row in self.rows("accuracy"):
@@ -174,7 +190,7 @@ class Smoke(SmokeRun):
         self.assertGreater(paper, 2 * ours)
         coarse, fine = (self.rows("accuracy", model="ball", peer=f"paper-{n}x{2 * n}-layer2", shell_percent=3.0)[0]
                         for n in (50, 100))
-        self.assertLess(fine["wrong_feet_percent"], 2)
+        self.assertLess(fine["wrong_feet_percent"], 3)
         # The printed query measures to nodes, 1.6 % of R_max apart at the most.
         self.assertLess(fine["mean_error_percent"], 0.4)
         self.assertGreater(coarse["mean_error_percent"], fine["mean_error_percent"])
