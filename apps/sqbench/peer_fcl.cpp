@@ -12,6 +12,7 @@
 #include <fcl/narrowphase/detail/traversal/collision_node.h>
 
 #include "peer.hpp"
+#include "peer_fcl_sheet.hpp"
 
 namespace sqmap::bench {
 namespace {
@@ -94,7 +95,40 @@ class FclPeer : public ContactPeer {
   mutable fcl::CollisionResultd result_;  // keeps its memory from frame to frame
 };
 
+class FclSheet : public SheetTree {
+ public:
+  FclSheet(const Model& model, const bake::Mesh& sheet, TreeUpdate update)
+      : object_(tree_of<Volume>(model.mesh)),
+        sheet_(tree_of<Volume>(sheet)),
+        refits_(update == TreeUpdate::kRefit),
+        moved_m_(sheet.vertices_m.size()) {
+    request_.num_max_contacts = static_cast<std::size_t>(std::numeric_limits<int>::max());
+  }
+  std::size_t contacts(std::span<const Vec3d> places_m) const override {
+    for (std::size_t i = 0; i < moved_m_.size(); ++i)
+      moved_m_[i] = {places_m[i].x, places_m[i].y, places_m[i].z};
+    sheet_->beginReplaceModel();
+    sheet_->replaceSubModel(moved_m_);
+    sheet_->endReplaceModel(refits_, true);
+    result_.clear();
+    const fcl::Transform3d here = fcl::Transform3d::Identity();
+    return fcl::collide(object_.get(), here, sheet_.get(), here, request_, result_);
+  }
+
+ private:
+  using Volume = fcl::OBB<double>;
+  std::shared_ptr<fcl::BVHModel<Volume>> object_, sheet_;
+  bool refits_;
+  mutable std::vector<fcl::Vector3d> moved_m_;
+  fcl::CollisionRequestd request_;
+  mutable fcl::CollisionResultd result_;
+};
+
 }  // namespace
+
+std::unique_ptr<SheetTree> make_fcl_sheet(const Model& model, const bake::Mesh& sheet, TreeUpdate update) {
+  return std::make_unique<FclSheet>(model, sheet, update);
+}
 
 std::unique_ptr<ContactPeer> make_fcl(const Model& model, const bake::Mesh& probe, FclTree tree,
                                       bool first_contact_only) {

@@ -11,6 +11,7 @@
 #include <fmt/format.h>
 
 #include "contact_curves.hpp"
+#include "costume.hpp"
 #include "peer.hpp"
 #include "peer_rows.hpp"
 #include "peer_voxmap.hpp"
@@ -195,7 +196,10 @@ void run_model(const SuiteInput& input, const Model& model, Results& results) {
 }  // namespace
 
 void run_frames(const SuiteInput& input, Results& results) {
-  for (const Model& model : input.models) run_model(input, model, results);
+  for (const Model& model : input.models) {
+    run_model(input, model, results);
+    run_costume(input, model, results);
+  }
   if (!input.models.empty()) run_contact_curves(input, input.models.front(), results);
   run_scene(input, results);
 }

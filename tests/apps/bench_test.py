@@ -107,6 +107,11 @@ class SmokeRun(FolderTest):
     def rows(self, table, **wanted):
         return [row for row in self.results[table] if all(row[key] == value for key, value in wanted.items())]
 
+    def probe_frames(self, peer):
+        """Those of one object and the probe, in which all methods take part."""
+        return [row for row in self.rows("frames", peer=peer) if row["work"] in ("touching", "far", "grasp")]
+
+
 
 class Smoke(SmokeRun):
     """What the run found."""
@@ -123,7 +128,8 @@ class Smoke(SmokeRun):
         for table in ("peers", "works", "frames", "accuracy", "bake", "force", "budgets", "effects", "checks"):
             with self.subTest(table=table):
                 self.assertLessEqual({"ball", "brick"}, {row["model"] for row in self.results[table]})
-        self.assertEqual({row["work"] for row in self.results["frames"]}, {"touching", "far", "grasp"})
+        self.assertEqual({row["work"] for row in self.results["frames"]},
+                         {"touching", "far", "grasp", "costume", "scene"})
         self.assertEqual({row["shell_percent"] for row in self.results["accuracy"]}, {0.5, 3.0})
 
     def test_every_peer_answers_within_the_error_it_states(self):
@@ -147,6 +153,33 @@ class Smoke(SmokeRun):
                              ("pairs of another pose break it: crossing pairs that are not told, touching, percent", 2),
                              ("told pairs that are not near each other, touching, percent", 2)):
             self.assertEqual(claims.count(claim), count, claim)
+
+
+    def test_every_method_of_the_scene_finds_what_the_exact_meshes_of_all_objects_say(self):
+        scene = {row["peer"]: row for row in self.rows("frames", work="scene")}
+        self.assertEqual(scene.keys(), {"sqmap-layer2", "sqmap-layer3", "grid-int16-128-simd", "fcl-obb-all-contacts"})
+        work = self.rows("works", work="scene")[0]
+        self.assertTrue(work["model"].startswith("2 objects"))
+        self.assertGreater(work["contacts_mean"], 0)
+        for layer in (2, 3):
+            self.assertGreaterEqual(scene[f"sqmap-layer{layer}"]["answers_mean"], 0.95 * work["contacts_mean"])
+        self.assertAlmostEqual(scene["grid-int16-128-simd"]["answers_mean"], work["near_mean"],
+                               delta=1 + 0.02 * work["near_mean"])
+        self.assertGreater(scene["fcl-obb-all-contacts"]["answers_mean"], 0)
+        claims = [check["claim"] for check in self.rows("checks", model=work["model"])]
+        missed = "points inside an object of the scene that are missed, percent"
+        self.assertEqual(sorted(claims), 2 * [missed] + 2 * ["the touched object left out breaks it: " + missed])
+
+
+    def test_sheet_of_the_costume_drapes_and_trees_that_are_refitted_or_rebuilt_agree(self):
+        for model in ("ball", "brick"):
+            work = self.rows("works", model=model, work="costume")[0]
+            self.assertGreater(work["contacts_mean"], 20)
+            self.assertLessEqual(work["deepest_percent"], 0.5 + 1e-3)
+            frame = {row["peer"]: row["answers_mean"] for row in self.rows("frames", model=model, work="costume")}
+            self.assertEqual(frame["fcl-obb-all-contacts"], frame["fcl-obb-rebuilt-all-contacts"])
+            self.assertAlmostEqual(frame["grid-int16-128-simd"], work["near_mean"], delta=1 + 0.03 * work["near_mean"])
+            self.assertGreaterEqual(frame["sqmap-layer3"], 0.95 * work["contacts_mean"])
 
 
     def test_grids_answer_every_point_of_the_shells(self):
@@ -202,12 +235,12 @@ class Smoke(SmokeRun):
             for work, expected in (("touching", 1), ("far", 0)):
                 for row in self.rows("frames", peer=f"fcl-{tree}-first-contact", work=work):
                     self.assertEqual(row["answers_mean"], expected, row)
-        for row in self.rows("frames", peer="fcl-obb-all-contacts"):
+        for row in self.probe_frames("fcl-obb-all-contacts"):
             twin = self.rows("frames", peer="fcl-kdop18-all-contacts", model=row["model"], work=row["work"])[0]
             self.assertAlmostEqual(twin["answers_mean"], row["answers_mean"], delta=0.02 * row["answers_mean"])
 
     def test_scalar_vector_and_culled_grids_give_the_same_answers(self):
-        for row in self.rows("frames", peer="grid-int16-128-simd"):
+        for row in self.probe_frames("grid-int16-128-simd"):
             for other in ("grid-int16-128-simd-culled", "grid-float-128-simd", "grid-float-128-scalar"):
                 twin = self.rows("frames", peer=other, model=row["model"], work=row["work"])[0]
                 # Codes of 16 bits round: points on the rim of the band may fall to either side.
@@ -215,7 +248,7 @@ class Smoke(SmokeRun):
                                        delta=0 if "culled" in other else 1 + 0.01 * row["answers_mean"])
 
     def test_leaving_out_blocks_of_points_leaves_out_no_answer(self):
-        for row in self.rows("frames", peer="grid-float-128-simd"):
+        for row in self.probe_frames("grid-float-128-simd"):
             if row["work"] == "grasp":
                 self.assertGreater(row["answers_mean"], 10)
             for other, share in (("nanovdb-float-128", 0), ("openvdb-float-128", 0), ("nanovdb-8bit-128", 0.01),
