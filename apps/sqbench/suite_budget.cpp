@@ -93,22 +93,50 @@ std::optional<BuiltPeer> finest(const Ladder& ladder, const Model& model, double
 
 constexpr double kLeastBytes = 4096;  // that the baker takes for a limit
 
-/// Bakes with ever lower limits until what the runtime keeps fits. Parts cost half a kilobyte each before
-/// their maps begin, so small budgets get few.
-std::optional<Model> bake_within(const Model& model, double budget_bytes, bool is_smoke) {
+double resident_bytes(const Asset& asset) {
+  const auto object = runtime::Object::build(asset);
+  if (!object) throw std::runtime_error(object.error().finding);
+  return static_cast<double>(object.value().resident_bytes());
+}
+
+/// Bakes until what the runtime keeps fits, and nearly fills the budget. The baker's limit is on the maps in
+/// the file; loaded they take about four times that with all that belongs to a part, more or less by the
+/// object, so each bake tells the limit of the next. Below the least limit the error asked for decides: the
+/// nodes of a map go with its inverse.
+std::optional<Model> bake_within(const SuiteInput& input, const Model& model, double budget_bytes) {
+  constexpr int kMostBakes = 5;
+  constexpr double kFull = 0.85, kAim = 0.93;                     // of the budget
+  constexpr double kFinest_percent = 0.005, kCoarse_percent = 1;  // the first: the limit is to be the memory
   bake::BakeOptions options;
   options.set(bake::Quality::kFine);
-  options.max_error_percent = is_smoke ? 0.5 : 0.005;  // the limit is to be the memory
-  if (is_smoke) options.sample_count = 2000;
-  for (double share = 0.9; share > 0.3; share *= 0.8) {
-    options.max_bytes = static_cast<std::uint64_t>(std::max(share * budget_bytes, kLeastBytes));
-    options.max_parts = static_cast<std::uint32_t>(std::clamp(share * budget_bytes / 2048, 2.0, 48.0));
+  if (input.is_smoke) options.sample_count = 2000;
+  options.max_error_percent = input.is_smoke ? 0.5 : kFinest_percent;
+  options.max_parts = static_cast<std::uint32_t>(std::clamp(budget_bytes / 4096, 1.0, 48.0));
+  double limit_bytes = budget_bytes / 4.6, best_bytes = 0;
+  if (limit_bytes < kLeastBytes) options.max_error_percent = kCoarse_percent;
+  std::optional<Model> best;
+  for (int bakes = 0; bakes < kMostBakes && best_bytes < kFull * budget_bytes; ++bakes) {
+    options.max_bytes = static_cast<std::uint64_t>(std::max(limit_bytes, kLeastBytes));
     std::optional<Model> baked = baked_again(model, options);
-    const auto object = runtime::Object::build(baked->asset);
-    if (!object) throw std::runtime_error(object.error().finding);
-    if (static_cast<double>(object.value().resident_bytes()) <= budget_bytes) return baked;
+    const double bytes = resident_bytes(baked->asset);
+    input.note(
+        fmt::format("budget: {}, {} KB: at most {} bytes of maps and an error of {:.3g} % give {:.0f} "
+                    "bytes in {} parts",
+                    model.name, budget_bytes / 1024, options.max_bytes, options.max_error_percent, bytes,
+                    baked->asset.parts.size()));
+    const bool fits = bytes <= budget_bytes;
+    if (fits && bytes > best_bytes) {
+      best = std::move(baked);
+      best_bytes = bytes;
+    }
+    if (input.is_smoke && fits) break;
+    const double ratio = std::clamp(kAim * budget_bytes / bytes, 0.2, 2.0);
+    if (limit_bytes > kLeastBytes)
+      limit_bytes *= ratio;
+    else
+      options.max_error_percent = std::clamp(options.max_error_percent / ratio, kFinest_percent, 50.0);
   }
-  return std::nullopt;
+  return best;
 }
 
 /// Errors near contact.
@@ -149,7 +177,7 @@ void run_model(const SuiteInput& input, const Model& model, double budget_bytes,
   input.note(fmt::format("budget: {}, {} KB", model.name, budget_bytes / 1024));
   Results unused;  // settings that were tried on the way are no peers of the report
   std::vector<BuiltPeer> peers;
-  const std::optional<Model> baked = bake_within(model, budget_bytes, input.is_smoke);
+  const std::optional<Model> baked = bake_within(input, model, budget_bytes);
   if (baked)
     for (const int layer : {2, 3}) {
       const std::string id = fmt::format("sqmap-layer{}", layer);
