@@ -54,6 +54,7 @@ std::vector<std::string> budget_words(const Results& results) {
   for (const double budget : budgets) {
     const Losses closest = losses_of(results, budget, "sqmap-layer3", &BudgetRow::mean_error_percent);
     const Losses faster = losses_of(results, budget, "sqmap-layer2", &BudgetRow::mean_error_percent);
+    const Losses normals = losses_of(results, budget, "sqmap-layer3", &BudgetRow::normal_mean_deg);
     const Losses depth = losses_of(results, budget, "sqmap-layer3", &BudgetRow::depth_error_percent);
     std::string text = fmt::format("{:g} KB an object: ", budget / 1024);
     if (closest.models < models.size())
@@ -63,12 +64,15 @@ std::vector<std::string> budget_words(const Results& results) {
       continue;
     }
     if (closest.lost() == 0)
-      text += "no rival has both a smaller error within 1 % of the surface and a shorter frame than layer 3";
+      text +=
+          "no rival has both a smaller error, of the points it answers within 1 % of the surface, and a "
+          "shorter frame than "
+          "layer 3";
     else
       text += fmt::format(
-          "a rival has both a smaller error within 1 % of the surface and a shorter frame than layer 3 on {} "
-          "of "
-          "{} models",
+          "a rival has both a smaller error, of the points it answers within 1 % of the surface, and a "
+          "shorter "
+          "frame than layer 3 on {} of {} models",
           closest.lost(), closest.models);
     std::vector<std::string> by;
     for (const auto& [rival, lost_on] : closest.models_by_rival)
@@ -77,8 +81,8 @@ std::vector<std::string> budget_words(const Results& results) {
     words.push_back(
         fmt::format("{}; than layer 2 on {} of {}. By the error of the penetration depth, where no answer "
                     "counts as none, "
-                    "layer 3 loses on {}.",
-                    text, faster.lost(), faster.models, depth.lost()));
+                    "layer 3 loses on {}; by the angle of the normals on {}.",
+                    text, faster.lost(), faster.models, depth.lost(), normals.lost()));
   }
   return words;
 }

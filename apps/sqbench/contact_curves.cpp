@@ -2,8 +2,10 @@
 #include "contact_curves.hpp"
 
 #include <algorithm>
+#include <cstddef>
 #include <span>
 #include <stdexcept>
+#include <utility>
 #include <vector>
 
 #include <fmt/format.h>
@@ -88,13 +90,20 @@ void run_slide(const SuiteInput& input, const Model& model, const Probe& probe, 
 }
 
 void run_press(const SuiteInput& input, const Model& model, const Probe& probe, Results& results) {
-  const std::vector<Placement> press = make_press(model, probe, input.is_smoke ? 4 : 20);
-  std::vector<std::size_t> inside;
-  for (const Placement& placement : press)
-    inside.push_back(static_cast<std::size_t>(std::count_if(
-        probe.cloud.points_m.begin(), probe.cloud.points_m.end(),
-        [&](const Vec3f& p) { return model.oracle->inside(cast<double>(placement.apply(p))); })));
-  const std::vector<double> x(inside.begin(), inside.end());
+  std::vector<std::pair<std::ptrdiff_t, Placement>> by_contacts;  // deeper poses need not have more
+  for (const Placement& placement : make_press(model, probe, input.is_smoke ? 4 : 20))
+    by_contacts.emplace_back(
+        std::count_if(probe.cloud.points_m.begin(), probe.cloud.points_m.end(),
+                      [&](const Vec3f& p) { return model.oracle->inside(cast<double>(placement.apply(p))); }),
+        placement);
+  std::stable_sort(by_contacts.begin(), by_contacts.end(),
+                   [](const auto& a, const auto& b) { return a.first < b.first; });
+  std::vector<double> x;
+  std::vector<Placement> press;
+  for (const auto& [inside, placement] : by_contacts) {
+    x.push_back(static_cast<double>(inside));
+    press.push_back(placement);
+  }
   const auto layer_2 = make_sqmap(model, 2, 0), layer_3 = make_sqmap(model, 3, 0),
              grid = make_grid(model, GridCode::kInt16Simd, 128), paper = make_paper(model, 100, 200, 0);
   const auto tree = make_fcl(model, probe.mesh, FclTree::kObb, false);

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <map>
 #include <set>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -80,61 +81,97 @@ std::string frame_words(const Results& results) {
   return words;
 }
 
-/// The target of the project: at no budget of 8 to 128 KB may a rival be both more accurate near contact and
-/// faster.
-std::string accuracy_words(const Results& results) {
-  std::string words;
+std::string joined(const std::set<std::string>& names) {
+  std::string text;
+  for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
+  return text;
+}
+
+/// At how many settings of sqmap a rival is at once smaller, better in `value` and faster a point.
+std::string losses_in_shell(const Results& results, double shell_percent, double AccuracyRow::*value,
+                            const char* better) {
+  std::map<std::pair<std::string, std::string>, double> bytes;
+  for (const PeerRow& row : results.peers) bytes[{row.model, row.peer}] = static_cast<double>(row.bytes);
+  const auto bytes_of = [&](const AccuracyRow& row) {
+    const auto it = bytes.find({row.model, row.peer});
+    return it == bytes.end() ? INFINITY : it->second;
+  };
   std::size_t cases = 0, beaten = 0;
   std::set<std::string> by;
-  double wrong = 0, answered = 0;
-  double rivals_least = 100;
-  std::size_t models = 0;
   for (const AccuracyRow& ours : results.accuracy) {
-    if (ours.shell_percent > 0.51) continue;
-    if (!is_ours(ours.peer)) rivals_least = std::min(rivals_least, ours.answered_outside_percent);
-    if (!is_ours(ours.peer)) continue;
-    if (ours.peer == "sqmap-layer3") {
-      wrong += ours.wrong_side_percent;
-      answered += ours.answered_outside_percent;
-      ++models;
-    }
-    const auto bytes_of = [&](const std::string& peer) {
-      const auto it = std::find_if(results.peers.begin(), results.peers.end(), [&](const PeerRow& row) {
-        return row.model == ours.model && row.peer == peer;
-      });
-      return it == results.peers.end() ? INFINITY : static_cast<double>(it->bytes);
-    };
-    const double budget = bytes_of(ours.peer);
+    if (std::abs(ours.shell_percent - shell_percent) > 1e-6 || !is_ours(ours.peer)) continue;
     ++cases;
-    for (const AccuracyRow& rival : results.accuracy)
-      if (rival.model == ours.model && rival.shell_percent == ours.shell_percent && !is_ours(rival.peer) &&
-          bytes_of(rival.peer) <= budget && rival.mean_error_percent < ours.mean_error_percent &&
-          rival.ns.median < ours.ns.median) {
-        ++beaten;
-        by.insert(rival.peer);
-        break;
-      }
+    bool is_beaten = false;
+    for (const AccuracyRow& rival : results.accuracy) {
+      if (rival.model != ours.model || rival.shell_percent != ours.shell_percent || is_ours(rival.peer) ||
+          !(bytes_of(rival) <= bytes_of(ours)) || !(rival.*value < ours.*value) ||
+          !(rival.ns.median < ours.ns.median))
+        continue;
+      is_beaten = true;
+      by.insert(rival.peer);
+    }
+    if (is_beaten) ++beaten;
   }
-  if (cases == 0) return words;
-  std::string names;
-  for (const std::string& name : by) names += (names.empty() ? "" : ", ") + name;
-  words += sentence(
+  if (cases == 0) return {};
+  const std::string where = fmt::format(
+      "{} (+-{} % shell)", shell_percent < 1 ? "Near contact" : "Around the surface", shell_percent);
+  return sentence(
       beaten == 0
           ? fmt::format(
-                "Near contact (+-0.5 % shell), for none of {} settings of sqmap is a rival at once smaller, "
-                "more accurate and faster a point.",
-                cases)
-          : fmt::format(
-                "Near contact (+-0.5 % shell), sqmap loses at {} of {} settings: a rival is at once smaller, "
-                "more accurate and faster a point ({}).",
-                beaten, cases, names));
-  if (models > 0)
-    words += sentence(fmt::format(
-        "In that shell sqmap (layer 3) puts {:.2g} % of the points on the wrong side, "
-        "and of the points outside the "
-        "object it knows a distance for {:.3g} %: the others lie outside every "
-        "superquadric. Of the rivals that tell distances, none knows less than {:.4g} %.",
-        wrong / static_cast<double>(models), answered / static_cast<double>(models), rivals_least));
+                "{}, for none of {} settings of sqmap is a rival at once smaller, faster a point and {}.",
+                where, cases, better)
+          : fmt::format("{}, sqmap loses at {} of {} settings: a rival is at once smaller, faster a point "
+                        "and {} ({}).",
+                        where, beaten, cases, better, joined(by)));
+}
+
+/// What is not answered is in no mean: it is said beside them.
+std::string answered_words(const Results& results, double shell_percent) {
+  double wrong = 0, answered = 0, angle_deg = 0, best_angle_deg = INFINITY, rivals_least = 100;
+  std::size_t models = 0;
+  std::map<std::string, std::pair<double, std::size_t>> angles;
+  for (const AccuracyRow& row : results.accuracy) {
+    if (std::abs(row.shell_percent - shell_percent) > 1e-6) continue;
+    if (!is_ours(row.peer)) {
+      rivals_least = std::min(rivals_least, row.answered_outside_percent);
+      auto& [sum_deg, count] = angles[row.peer];
+      sum_deg += row.normal_mean_deg, ++count;
+    }
+    if (row.peer != "sqmap-layer3") continue;
+    wrong += row.wrong_side_percent;
+    answered += row.answered_outside_percent;
+    angle_deg += row.normal_mean_deg;
+    ++models;
+  }
+  if (models == 0) return {};
+  const auto count = static_cast<double>(models);
+  std::set<std::string> better;
+  for (const auto& [peer, sum] : angles) {
+    const double mean_deg = sum.first / static_cast<double>(sum.second);
+    if (mean_deg < angle_deg / count) better.insert(peer);
+    best_angle_deg = std::min(best_angle_deg, mean_deg);
+  }
+  return sentence(
+      fmt::format("In the +-{} % shell sqmap (layer 3) puts {:.2g} % of the points on the wrong side, and of "
+                  "the points outside "
+                  "the object it knows a distance for {:.3g} %: the others lie outside every superquadric, "
+                  "and are in none of its "
+                  "means. Of the rivals that tell distances, none knows less than {:.4g} %. Its normals are "
+                  "off by {:.3g} degrees "
+                  "in the mean; {}",
+                  shell_percent, wrong / count, answered / count, rivals_least, angle_deg / count,
+                  better.empty() ? "no rival's are closer."
+                                 : fmt::format("those of {} are closer, the closest by {:.3g} degrees.",
+                                               joined(better), angle_deg / count - best_angle_deg)));
+}
+
+std::string accuracy_words(const Results& results) {
+  std::string words;
+  for (const double shell_percent : {0.5, 3.0}) {
+    words += losses_in_shell(results, shell_percent, &AccuracyRow::mean_error_percent, "more accurate");
+    words += losses_in_shell(results, shell_percent, &AccuracyRow::normal_mean_deg, "closer in its normals");
+    words += answered_words(results, shell_percent);
+  }
   return words;
 }
 
@@ -170,7 +207,12 @@ std::string tables(const Results& results) {
                  number(row.answered_inside_percent) + " / " + number(row.answered_outside_percent),
                  number(row.ns.median)},
                 is_ours(row.peer));
-    html += "<h2>Accuracy</h2>\n" + table.html();
+    html +=
+        "<h2>Accuracy</h2>\n<p>Errors and angles are those of the points that the method answered; the "
+        "column before "
+        "the last tells how many of those inside and outside the object that are. The side counts for every "
+        "point.</p>\n" +
+        table.html();
   }
   if (!results.budgets.empty()) {
     Table table({"model", "method", "budget, KB", "KB resident", "error, %", "depth error, %",
@@ -184,7 +226,9 @@ std::string tables(const Results& results) {
                 is_ours(row.peer));
     html +=
         "<h2>Budgets</h2>\n<p>Of each method the finest setting that fits; sqmap is baked for each budget. "
-        "Errors within 1 % of R_max of the surface.</p>\n" +
+        "Errors and angles of the answered points within 1 % of R_max of the surface; the error of the depth "
+        "is that of "
+        "all of them, no answer counting as no depth.</p>\n" +
         table.html();
   }
   if (!results.peers.empty()) {

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstddef>
 #include <limits>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -47,7 +48,8 @@ double frame_ratio(const Results& results, const std::string& work, const std::s
 }
 
 void add_tree_words(const Results& results, std::vector<std::string>& words) {
-  for (const char* work : {"touching", "grasp"}) {
+  for (const auto& [work, figure] :
+       {std::pair{"touching", "11a"}, std::pair{"grasp", "11a"}, std::pair{"costume", "11b"}}) {
     double share[3];
     for (int layer = 1; layer <= 3; ++layer)
       share[layer - 1] =
@@ -59,9 +61,9 @@ void add_tree_words(const Results& results, std::vector<std::string>& words) {
       if (frame_ratio(results, work, "sqmap-layer3", peer) > 1)
         lost += (lost.empty() ? "" : ", ") + std::string(peer);
     words.push_back(fmt::format(
-        "Fig. 11, {}: layers 1, 2 and 3 cost {:.3g}, {:.3g} and {:.3g} % of the OBB tree that tells all "
+        "Fig. {}, {}: layers 1, 2 and 3 cost {:.3g}, {:.3g} and {:.3g} % of the OBB tree that tells all "
         "contacts (the paper prints no values). {}",
-        work, share[0], share[1], share[2],
+        figure, work, share[0], share[1], share[2],
         lost.empty() ? "Layer 3 is faster than every method that tests triangles."
                      : "Layer 3 loses to methods that test triangles: " + lost + "."));
   }
@@ -102,15 +104,15 @@ void add_query_words(const Results& results, std::vector<std::string>& words) {
       ours.wrong_side_percent, theirs.wrong_feet_percent, foot.wrong_feet_percent));
 }
 
-/// Fig. 13: the paper says that its smoothed map gives no spikes, and prints no values.
-void add_force_words(const Results& results, std::vector<std::string>& words) {
+/// Jumps, change and direction of each method, means over the models. `name_end`: of the peers' names.
+std::string force_of(const Results& results, const char* name_end) {
   std::string text;
   for (const char* peer : {"mesh-normals", "mesh-shaded", "sqmap-layer3", "sqmap-layer3-smoothed",
                            "sqmap-layer3-tracked", kReference}) {
     double jumps = 0, change = 0, angle_deg = 0;
     std::size_t models = 0;
     for (const ForceRow& row : results.force)
-      if (row.peer == peer)
+      if (row.peer == std::string(peer) + name_end)
         jumps += row.jumps_percent, change += row.mean_change_percent, angle_deg += row.direction_error_deg,
             ++models;
     if (models == 0) continue;
@@ -118,12 +120,51 @@ void add_force_words(const Results& results, std::vector<std::string>& words) {
     text += fmt::format("{}{}: {:.2g} %, {:.3g} %, {:.2g} deg", text.empty() ? "" : "; ", peer, jumps / count,
                         change / count, angle_deg / count);
   }
+  return text;
+}
+
+/// Fig. 13: the paper says that its smoothed map gives no spikes, and prints no values.
+void add_force_words(const Results& results, std::vector<std::string>& words) {
+  const std::string text = force_of(results, ""), small = force_of(results, kSmallStepsName);
   if (!text.empty())
     words.push_back(
         "Fig. 13, a point that slides 0.5 % of R_max deep (share of steps whose force changes by more than a "
         "tenth, "
         "mean change, direction off the exact gradient; the paper prints no values): " +
         text + ".");
+  if (!small.empty())
+    words.push_back("Fig. 13b in steps of about 0.005 % of R_max, the same shares: " + small + ".");
+}
+
+/// Each effect over the reaction alone, mean over the models of the differences.
+void add_effect_words(const Results& results, std::vector<std::string>& words) {
+  const std::string start = "scene, layer 3: reaction";
+  std::vector<std::pair<std::string, GeometricMean>> ratios;
+  GeometricMean plain_us;
+  for (const EffectRow& alone : results.effects) {
+    if (alone.variant != start) continue;
+    plain_us.add(alone.us.median);
+    for (const EffectRow& row : results.effects) {
+      if (row.model != alone.model || !row.variant.starts_with(start + ", ")) continue;
+      const std::string name = row.variant.substr(start.size() + 2);
+      auto it =
+          std::find_if(ratios.begin(), ratios.end(), [&](const auto& known) { return known.first == name; });
+      if (it == ratios.end()) it = ratios.insert(it, {name, {}});
+      it->second.add(row.us.median / alone.us.median);
+    }
+  }
+  if (ratios.empty()) return;
+  std::string text;
+  for (const auto& [name, ratio] : ratios)
+    text += fmt::format("{}{} {:+.2g} %", text.empty() ? "" : ", ", name, 100 * (ratio.value() - 1));
+  words.push_back(fmt::format(
+      "Effects: a touching frame of a scene in layer 3 with the reaction alone takes {:.3g} us; beside it "
+      "take {} "
+      "(geometric means over the models). An effect that a scene does not name takes nothing: the test "
+      "Scene.UnusedEffectsRunNoInstruction counts as many instructions a frame as a program has that knows "
+      "no "
+      "effect but the reaction.",
+      plain_us.value(), text));
 }
 
 /// Fig. 14c and the times of section 7.1.
@@ -212,6 +253,7 @@ std::vector<std::string> paper_words(const Results& results) {
   add_query_words(results, words);
   add_tree_words(results, words);
   add_force_words(results, words);
+  add_effect_words(results, words);
   add_error_words(results, words);
   add_memory_words(results, words);
   return words;

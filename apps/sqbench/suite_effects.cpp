@@ -1,13 +1,19 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
 // What each thing that a frame may ask of the runtime adds to it.
+#include <algorithm>
 #include <memory>
 #include <stdexcept>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include <fmt/format.h>
 
 #include "sqmap/runtime/object.hpp"
+#include "sqmap/runtime/scene.hpp"
 
+#include "pose_of.hpp"
 #include "suites.hpp"
 #include "timing.hpp"
 #include "work.hpp"
@@ -26,6 +32,52 @@ struct Variant {
   runtime::QueryOptions options;
   bool wants_distance, wants_normal, wants_surface;
 };
+
+/// Frames of a scene with the reaction, and with each effect beside it. Lengths that are parameters grow with
+/// the object.
+void run_scenes(const SuiteInput& input, const Model& model, const Probe& probe, const Sequence& sequence,
+                Results& results) {
+  struct Timed {
+    std::string name;
+    runtime::Scene scene;
+  };
+  std::vector<Timed> scenes;
+  const auto add = [&](const std::string& name, std::vector<runtime::EffectChoice> effects) {
+    const runtime::SceneObject object{&model.asset, {}};
+    auto scene = runtime::Scene::build({&object, 1}, {probe.cloud.points_m},
+                                       {{runtime::Layer::kThree, 0, 0}, std::move(effects)});
+    if (!scene) throw std::runtime_error(scene.error().finding);
+    scenes.push_back({"scene, layer 3: " + name, std::move(scene).value()});
+  };
+  add("contacts", {});
+  add("reaction", {{"reaction", {}}});
+  for (const runtime::EffectInfo& effect : runtime::effect_table()) {
+    const std::string name = effect.name;
+    if (name == "reaction") continue;
+    runtime::EffectChoice choice{name, {}};
+    for (const auto& parameter : effect.parameters)
+      if (const std::string length = parameter.name; length.ends_with("_m") && !length.ends_with("_per_m"))
+        choice.values.emplace_back(length, std::clamp(parameter.initial * static_cast<float>(model.r_max_m()),
+                                                      parameter.least, parameter.most));
+    add("reaction, " + name, {{"reaction", {}}, choice});
+  }
+  std::vector<Contestant> contestants;
+  for (Timed& timed : scenes)
+    contestants.push_back(
+        {timed.name, [&](std::size_t pose) -> std::size_t {
+           return timed.scene.frame(pose_of(sequence.object_from_probe[pose]), {}, 1e-3F).inside;
+         }});
+  const std::vector<Timing> timings =
+      measure(contestants, sequence.object_from_probe.size(), input.is_smoke ? 3 : 11);
+  for (std::size_t i = 0; i < contestants.size(); ++i) {
+    results.effects.push_back({model.name, contestants[i].name, timings[i].spread(1e6)});
+    if (i > 0)
+      results.checks.push_back(
+          {model.name, contestants[i].name, "contacts a frame, as without the effect",
+           timings[i].answers_mean, timings[0].answers_mean,
+           timings[i].answers_mean == timings[0].answers_mean && timings[0].answers_mean > 0});
+  }
+}
 
 }  // namespace
 
@@ -72,6 +124,7 @@ void run_effects(const SuiteInput& input, Results& results) {
     const std::vector<Timing> timings = measure(contestants, frames.size(), input.is_smoke ? 3 : 11);
     for (std::size_t i = 0; i < contestants.size(); ++i)
       results.effects.push_back({model.name, contestants[i].name, timings[i].spread(1e6)});
+    run_scenes(input, model, probe, sequence, results);
   }
 }
 

@@ -19,6 +19,7 @@
 #include "sqmap/runtime/instance.hpp"
 
 #include "closest.hpp"
+#include "paper_words.hpp"
 #include "peer_rows.hpp"
 #include "suites.hpp"
 #include "work.hpp"
@@ -26,21 +27,25 @@
 namespace sqmap::bench {
 namespace {
 
-constexpr double kDepth = 0.005;         ///< of R_max
-constexpr double kJump = 0.1;            ///< of the mean force
-constexpr double kLongestStep = 0.01;    ///< of R_max; longer steps are no slide
-constexpr std::size_t kWayRound = 8000;  ///< steps of the whole path
-constexpr std::size_t kDrawn = 300;      ///< steps of Fig. 13
+constexpr double kDepth = 0.005;                        ///< of R_max
+constexpr double kJump = 0.1;                           ///< of the mean force
+constexpr double kLongestStep = 0.01;                   ///< of R_max; longer steps are no slide
+constexpr std::size_t kWayRound = 8000;                 ///< steps of the whole path
+constexpr std::size_t kSmallWayRound = 50 * kWayRound;  ///< in small steps, as of a haptic device
+constexpr std::size_t kSmallSteps = 4000;               ///< of them, from the middle of the path
+constexpr double kLongestSmallStep = 0.0005;            ///< of R_max
+constexpr std::size_t kDrawn = 300;                     ///< steps of Fig. 13
 /// Of the two effects, in R_max; the same share of an object of 1 m as their defaults.
 constexpr double kSmoothing = 0.005, kCatchUp = 1e-4, kLose = 0.01;
 
 /// Points at constant depth where rays from all around towards the centre enter; entries first to last of
-/// kWayRound. Empty slots break the slide: the next entry lies elsewhere.
-std::vector<Vec3d> slide(const Model& model, std::size_t first, std::size_t last) {
+/// way_round. Empty slots break the slide: the next entry lies elsewhere.
+std::vector<Vec3d> slide(const Model& model, std::size_t first, std::size_t last,
+                         std::size_t way_round = kWayRound) {
   const Vec3d centre = 0.5 * (model.low_m + model.high_m);
   std::vector<Vec3d> path;
   for (std::size_t i = first; i < last; ++i) {
-    const double t = (static_cast<double>(i) + 0.5) / kWayRound, z = 0.9 * (1 - 2 * t);
+    const double t = (static_cast<double>(i) + 0.5) / static_cast<double>(way_round), z = 0.9 * (1 - 2 * t);
     const double angle = 2 * std::numbers::pi * 3 * t, r = std::sqrt(1 - z * z);
     const Vec3d direction{r * std::cos(angle), r * std::sin(angle), z};
     double out_m = norm(model.high_m - model.low_m);
@@ -124,8 +129,20 @@ std::vector<Felt> felt_by_effect(const Model& model, const std::vector<Vec3d>& p
   return felt;
 }
 
-bool is_step(const Model& model, const std::vector<Vec3d>& path, std::size_t i) {
-  return i > 0 && norm(path[i] - path[i - 1]) <= kLongestStep * model.r_max_m();
+runtime::Smoothing smoothing_of(const Model& model) {
+  runtime::Smoothing smoothing;
+  smoothing.radius_m = static_cast<float>(kSmoothing * model.r_max_m());
+  return smoothing;
+}
+runtime::Tracking tracking_of(const Model& model) {
+  runtime::Tracking tracking;
+  tracking.catch_up_m = static_cast<float>(kCatchUp * model.r_max_m());
+  tracking.lose_m = static_cast<float>(kLose * model.r_max_m());
+  return tracking;
+}
+
+bool is_step(const Model& model, const std::vector<Vec3d>& path, std::size_t i, double longest) {
+  return i > 0 && norm(path[i] - path[i - 1]) <= longest * model.r_max_m();
 }
 
 double angle_deg(const Vec3d& a, const Vec3d& b) {
@@ -133,7 +150,7 @@ double angle_deg(const Vec3d& a, const Vec3d& b) {
 }
 
 ForceRow summary(const Model& model, const std::string& peer, const std::vector<Vec3d>& path,
-                 const std::vector<Felt>& felt) {
+                 const std::vector<Felt>& felt, double longest_step) {
   const double mean_n = kStiffness_n_per_m * kDepth * model.r_max_m();
   ForceRow row;
   row.model = model.name;
@@ -148,7 +165,7 @@ ForceRow summary(const Model& model, const std::string& peer, const std::vector<
       sum_deg += angle_deg(felt[i].normal, normalized(nearest.nearest_m - path[i]));
       ++angles;
     }
-    if (!is_step(model, path, i)) continue;
+    if (!is_step(model, path, i, longest_step)) continue;
     const double step = norm(felt[i].force_n - felt[i - 1].force_n) / mean_n;
     ++row.steps;
     change += step;
@@ -166,10 +183,11 @@ ForceRow summary(const Model& model, const std::string& peer, const std::vector<
 }
 
 /// The longest unbroken stretch of the path, at most kDrawn steps from its beginning.
-std::pair<std::size_t, std::size_t> stretch_to_draw(const Model& model, const std::vector<Vec3d>& path) {
+std::pair<std::size_t, std::size_t> stretch_to_draw(const Model& model, const std::vector<Vec3d>& path,
+                                                    double longest_step) {
   std::size_t begin = 0, best = 0, length = 0;
   for (std::size_t i = 0; i < path.size(); ++i) {
-    if (!is_step(model, path, i)) begin = i;
+    if (!is_step(model, path, i, longest_step)) begin = i;
     if (i + 1 - begin > length) best = begin, length = i + 1 - begin;
   }
   return {best, best + std::min(length, kDrawn)};
@@ -178,7 +196,7 @@ std::pair<std::size_t, std::size_t> stretch_to_draw(const Model& model, const st
 /// Fig. 13a: how the direction turns along the way. Fig. 13b: how the force changes from step to step.
 void add_curves(const Model& model, const std::string& curve, const std::vector<Vec3d>& path,
                 const std::vector<Felt>& felt, Results& results) {
-  const auto [begin, end] = stretch_to_draw(model, path);
+  const auto [begin, end] = stretch_to_draw(model, path, kLongestStep);
   const double mean_n = kStiffness_n_per_m * kDepth * model.r_max_m();
   CurveRow turn{"13a", model.name, curve, {}, {}}, change{"13b", model.name, curve, {}, {}};
   const Vec3d ahead = normalized(path[end - 1] - path[begin]);
@@ -195,6 +213,43 @@ void add_curves(const Model& model, const std::string& curve, const std::vector<
   results.curves.push_back(std::move(change));
 }
 
+/// From the middle of the way, or as near to it as the rays find enough of the object to draw.
+std::vector<Vec3d> small_steps(const Model& model, std::size_t steps) {
+  for (const double share : {0.5, 0.45, 0.55, 0.4, 0.6, 0.35, 0.65, 0.3, 0.7, 0.25, 0.75, 0.2, 0.8}) {
+    const auto middle = static_cast<std::size_t>(share * static_cast<double>(kSmallWayRound));
+    std::vector<Vec3d> path = slide(model, middle - steps / 2, middle + steps / 2, kSmallWayRound);
+    if (path.empty()) continue;
+    const auto [begin, end] = stretch_to_draw(model, path, kLongestSmallStep);
+    if (end - begin == kDrawn) return path;
+  }
+  throw std::runtime_error("no rays towards the centre of " + model.name + " find a stretch of it");
+}
+
+/// Fig. 13b once more, in steps as small as those of a haptic device.
+void run_small_steps(const SuiteInput& input, const Model& model, bool is_drawn, Results& results) {
+  const std::vector<Vec3d> path = small_steps(model, input.is_smoke ? kSmallSteps / 10 : kSmallSteps);
+  const double mean_n = kStiffness_n_per_m * kDepth * model.r_max_m();
+  const auto [begin, end] = stretch_to_draw(model, path, kLongestSmallStep);
+  const auto add = [&, first = begin, last = end](const std::string& peer, const std::vector<Felt>& felt) {
+    results.force.push_back(summary(model, peer + kSmallStepsName, path, felt, kLongestSmallStep));
+    if (!is_drawn) return;
+    CurveRow change{"13b-small", model.name, peer, {}, {}};
+    double way = 0;
+    for (std::size_t i = first + 1; i < last; ++i) {
+      way += 100 * norm(path[i] - path[i - 1]) / model.r_max_m();
+      change.x.push_back(way);
+      change.y.push_back(100 * norm(felt[i].force_n - felt[i - 1].force_n) / mean_n);
+    }
+    results.curves.push_back(std::move(change));
+  };
+  add("mesh-normals", felt_by_triangles(model, path, false));
+  add("mesh-shaded", felt_by_triangles(model, path, true));
+  add("sqmap-layer3", felt_by(*make_sqmap(model, 3, 0), path));
+  add(kReference, felt_by(*make_grid(model, GridCode::kInt16Simd, 128), path));
+  add("sqmap-layer3-smoothed", felt_by_effect(model, path, smoothing_of(model)));
+  add("sqmap-layer3-tracked", felt_by_effect(model, path, tracking_of(model)));
+}
+
 }  // namespace
 
 void run_force(const SuiteInput& input, Results& results) {
@@ -204,23 +259,18 @@ void run_force(const SuiteInput& input, Results& results) {
         input.is_smoke ? slide(model, kWayRound / 2 - 200, kWayRound / 2 + 200) : slide(model, 0, kWayRound);
     if (path.empty()) throw std::runtime_error("no ray towards the centre of " + model.name + " enters it");
     const auto add = [&](const std::string& peer, const std::vector<Felt>& felt, bool is_drawn) {
-      results.force.push_back(summary(model, peer, path, felt));
+      results.force.push_back(summary(model, peer, path, felt, kLongestStep));
       if (is_drawn) add_curves(model, peer, path, felt, results);
     };
     const bool is_first = &model == &input.models.front();
-    const auto r_max_m = static_cast<float>(model.r_max_m());
     add("mesh-normals", felt_by_triangles(model, path, false), is_first);
     add("mesh-shaded", felt_by_triangles(model, path, true), is_first);
     for (const Entrant& entrant : frame_entrants(model, input.is_smoke))
       add(entrant.id, felt_by(*build_peer(entrant, model, results).peer, path),
           is_first && (entrant.id == "sqmap-layer3" || entrant.id == kReference));
-    runtime::Smoothing smoothing;
-    smoothing.radius_m = static_cast<float>(kSmoothing) * r_max_m;
-    add("sqmap-layer3-smoothed", felt_by_effect(model, path, smoothing), is_first);
-    runtime::Tracking tracking;
-    tracking.catch_up_m = static_cast<float>(kCatchUp) * r_max_m;
-    tracking.lose_m = static_cast<float>(kLose) * r_max_m;
-    add("sqmap-layer3-tracked", felt_by_effect(model, path, tracking), is_first);
+    add("sqmap-layer3-smoothed", felt_by_effect(model, path, smoothing_of(model)), is_first);
+    add("sqmap-layer3-tracked", felt_by_effect(model, path, tracking_of(model)), is_first);
+    run_small_steps(input, model, is_first, results);
   }
 }
 

@@ -112,7 +112,6 @@ class SmokeRun(FolderTest):
         return [row for row in self.rows("frames", peer=peer) if row["work"] in ("touching", "far", "grasp")]
 
 
-
 class Smoke(SmokeRun):
     """What the run found."""
 
@@ -154,7 +153,6 @@ class Smoke(SmokeRun):
                              ("told pairs that are not near each other, touching, percent", 2)):
             self.assertEqual(claims.count(claim), count, claim)
 
-
     def test_every_method_of_the_scene_finds_what_the_exact_meshes_of_all_objects_say(self):
         scene = {row["peer"]: row for row in self.rows("frames", work="scene")}
         self.assertEqual(scene.keys(), {"sqmap-layer2", "sqmap-layer3", "grid-int16-128-simd", "fcl-obb-all-contacts"})
@@ -170,7 +168,6 @@ class Smoke(SmokeRun):
         missed = "points inside an object of the scene that are missed, percent"
         self.assertEqual(sorted(claims), 2 * [missed] + 2 * ["the touched object left out breaks it: " + missed])
 
-
     def test_sheet_of_the_costume_drapes_and_trees_that_are_refitted_or_rebuilt_agree(self):
         for model in ("ball", "brick"):
             work = self.rows("works", model=model, work="costume")[0]
@@ -181,6 +178,22 @@ class Smoke(SmokeRun):
             self.assertAlmostEqual(frame["grid-int16-128-simd"], work["near_mean"], delta=1 + 0.03 * work["near_mean"])
             self.assertGreaterEqual(frame["sqmap-layer3"], 0.95 * work["contacts_mean"])
 
+    def test_every_effect_is_timed_beside_the_reaction(self):
+        effects = {row["variant"] for row in self.rows("effects", model="ball")}
+        self.assertLessEqual({f"scene, layer 3: {name}" for name in
+                              ("contacts", "reaction", "reaction, friction", "reaction, smoothing",
+                               "reaction, tracking", "reaction, texture", "reaction, torque",
+                               "reaction, impact_zones", "reaction, force_limit", "reaction, slew_limit")}, effects)
+        self.assertIn("Scene.UnusedEffectsRunNoInstruction", self.files["index.html"])
+
+    def test_in_small_steps_a_tracked_force_jumps_no_more_than_its_bound(self):
+        for model in ("ball", "brick"):
+            row = self.rows("force", model=model, peer="sqmap-layer3-tracked, small steps")[0]
+            plain = self.rows("force", model=model, peer="sqmap-layer3, small steps")[0]
+            self.assertGreater(row["steps"], 300)
+            # k (3 |step| + 1e-4 R_max) of a mean force of k 0.005 R_max, at steps of up to 1e-4 R_max.
+            self.assertLess(row["worst_jump_percent"], 100 * (3e-4 + 1e-4) / 0.005 + 0.1)
+            self.assertLessEqual(row["jumps_percent"], plain["jumps_percent"])
 
     def test_grids_answer_every_point_of_the_shells(self):
         for row in self.rows("accuracy"):
@@ -322,7 +335,8 @@ class Smoke(SmokeRun):
             self.assertEqual(len(row["x"]), len(row["y"]), row["figure"])
             self.assertGreater(len(row["x"]), 1)
             figures.setdefault(row["figure"], {})[row["curve"]] = row
-        self.assertEqual(figures.keys(), {"13a", "13b", "14a", "14b", "14c", "objects", "objects-build", "probes"})
+        self.assertEqual(figures.keys(), {"13a", "13b", "13b-small", "14a", "14b", "14c", "objects", "objects-build",
+                                          "probes"})
         pressed = figures["14b"]["sqmap-layer3"]["x"]
         self.assertEqual(pressed, sorted(pressed))
         self.assertEqual(pressed[0], 0)
@@ -348,8 +362,9 @@ class Smoke(SmokeRun):
     def test_every_picture_draws_its_values_and_stands_on_the_page(self):
         pictures = {name: text for name, text in self.files.items() if name.endswith(".svg")}
         self.assertGreaterEqual(len(pictures), 15)
-        self.assertLessEqual({f"fig{name}.svg" for name in ("04", "10", "11-touching", "11-grasp", "12-first", "12-all",
-                                                            "13a", "13b", "14a", "14b", "14c")}, pictures.keys())
+        self.assertLessEqual({f"fig{name}.svg" for name in ("04", "10", "11-touching", "11-grasp", "11-costume", "12-first",
+                                                            "12-all", "13a", "13b", "13b-small", "14a", "14b",
+                                                            "14c")}, pictures.keys())
         for name, text in pictures.items():
             with self.subTest(name=name):
                 ET.fromstring(text)
@@ -365,7 +380,9 @@ class Smoke(SmokeRun):
         page = self.files["index.html"]
         self.assertNotRegex(page, r"<script|src=|href=\"(?!data:)")
         self.assertIn("Near contact (+-0.5 % shell)", page)
-        for words in ("The paper's query as printed", "Fig. 11, touching: layers 1, 2 and 3 cost",
+        for words in ("The paper's query as printed", "Fig. 11a, touching: layers 1, 2 and 3 cost",
+                      "Fig. 11b, costume: layers 1, 2 and 3 cost", "Fig. 13b in steps of about 0.005 %",
+                      "Around the surface (+-3 % shell)", "are in none of its means", "of the points it answers",
                       "Table 1, all models", "Fig. 14c: the paper prints errors of 0.4 to 0.5 %", "32 KB an object: "):
             self.assertIn(words, page)
         self.assertRegex(page, r"(wins against|loses to) that grid")
