@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <algorithm>
 #include <array>
+#include <ctime>
 #include <filesystem>
 #include <memory>
 #include <string>
@@ -86,7 +87,10 @@ Exit run_suites(Console& console, const RunArguments& arguments) {
   results.machine = bench::this_machine(bench::pin_thread());
   for (const bench::Suite& suite : kSuites) {
     if (arguments.suite != "all" && arguments.suite != suite.name) continue;
+    const std::clock_t start = std::clock();
     suite.run(input, results);
+    console.note(fmt::format("{}: done, {:.1f} s of processor time", suite.name,
+                             static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC));
     // After each, so that hours are not lost to what befalls a later one.
     const Exit written = write_all(console, arguments.out, results);
     if (written != Exit::kOk) return written;

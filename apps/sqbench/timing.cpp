@@ -41,7 +41,8 @@ Spread Timing::spread(double units_per_second) const {
 
 Spread Timing::ratio_to(const Timing& other) const {
   std::vector<double> values;
-  for (std::size_t i = 0; i < seconds.size(); ++i) values.push_back(seconds[i] / other.seconds[i]);
+  for (std::size_t i = 0; i < std::min(seconds.size(), other.seconds.size()); ++i)
+    values.push_back(seconds[i] / other.seconds[i]);
   return spread_of(std::move(values));
 }
 
@@ -54,17 +55,19 @@ std::vector<Timing> measure(const std::vector<Contestant>& contestants, std::siz
     return thread_s() - start_s;
   };
   std::vector<Timing> timings(contestants.size());
-  std::vector<std::size_t> rounds(contestants.size(), 1);
+  std::vector<std::size_t> rounds(contestants.size(), 1), turns(contestants.size(), repetitions);
   for (std::size_t c = 0; c < contestants.size(); ++c) {  // warms up, and counts
     std::size_t answers = 0;
     const double seconds = once(contestants[c], 1, answers);
     timings[c].answers_mean = static_cast<double>(answers) / static_cast<double>(items);
     rounds[c] =
         static_cast<std::size_t>(std::clamp(std::ceil(kShortest_s / std::max(seconds, 1e-9)), 1.0, 1e4));
+    if (seconds > kLong_s) turns[c] = std::min(repetitions, kTurnsOfLong);
   }
   for (std::size_t repetition = 0; repetition < repetitions; ++repetition)
     for (std::size_t turn = 0; turn < contestants.size(); ++turn) {
       const std::size_t c = (turn + repetition) % contestants.size();
+      if (repetition >= turns[c]) continue;
       std::size_t answers = 0;
       const double seconds = once(contestants[c], rounds[c], answers);
       timings[c].seconds.push_back(seconds / static_cast<double>(rounds[c] * items));

@@ -26,10 +26,11 @@ struct Timing {
 
 /// Times all contestants over all items. In each repetition each of them has its turn, each time another
 /// first, so that whatever disturbs the machine disturbs all; fast ones repeat their items until kShortest_s
-/// has passed.
+/// has passed, and those that take longer than kLong_s have the first kTurnsOfLong turns only.
 std::vector<Timing> measure(const std::vector<Contestant>& contestants, std::size_t items,
                             std::size_t repetitions);
-inline constexpr double kShortest_s = 5e-4;
+inline constexpr double kShortest_s = 5e-4, kLong_s = 0.05;
+inline constexpr std::size_t kTurnsOfLong = 5;
 
 /// Keeps this thread on one core. False where the system refuses.
 bool pin_thread();
