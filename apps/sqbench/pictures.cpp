@@ -241,7 +241,7 @@ void add_rest(const Results& results, std::vector<Picture>& pictures) {
       memory);
   add("force", "Change of force from step to step of a slide: mean over the models", "% of the mean force",
       jumps);
-  add("force-small-steps", "The same in steps of about 0.005 % of R_max: mean over the models",
+  add("force-small-steps", "Change of force in steps of about 0.005 % of R_max: mean over the models",
       "% of the mean force", small_jumps);
   add("effects", "What a touching frame costs by what it asks for: mean over the models",
       "microseconds a frame", effects);

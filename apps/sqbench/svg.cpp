@@ -240,7 +240,10 @@ std::string lines_svg(const std::string& title, const std::string& x_title, cons
 }
 
 std::string bars_svg(const std::string& title, const std::string& x_title, const std::vector<Bar>& bars) {
-  constexpr double kLeft = 230, kRight = 780, kTop = 44, kRow = 22;
+  constexpr double kLeast = 230, kLetter = 7, kRight = 780, kTop = 44, kRow = 22;
+  std::size_t longest = 0;
+  for (const Bar& bar : bars) longest = std::max(longest, bar.name.size());
+  const double left = std::max(kLeast, kLetter * static_cast<double>(longest) + 16);
   const double bottom = kTop + kRow * static_cast<double>(bars.size());
   double least = std::numeric_limits<double>::infinity(), most = 0;
   for (const Bar& bar : bars) {
@@ -248,19 +251,19 @@ std::string bars_svg(const std::string& title, const std::string& x_title, const
     most = std::max(most, bar.upper);
   }
   std::string svg = opening(bottom + 50, title);
-  if (!(least > 0) || !std::isfinite(least)) return svg + text(kLeft, 60, "start", "no values") + "</svg>\n";
-  const Axis x = axis_over(least, most, kLeft, kRight - kLeft);
+  if (!(least > 0) || !std::isfinite(least)) return svg + text(left, 60, "start", "no values") + "</svg>\n";
+  const Axis x = axis_over(least, most, left, kRight - left);
   for (const auto& [at, words] : ticks_of(x)) {
     svg += fmt::format("<line x1=\"{0:.1f}\" x2=\"{0:.1f}\" y1=\"{1}\" y2=\"{2}\" stroke=\"#ddd\"/>\n", at,
                        kTop, bottom);
     svg += text(at, bottom + 16, "middle", words);
   }
-  svg += text((kLeft + kRight) / 2, bottom + 38, "middle", x_title);
+  svg += text((left + kRight) / 2, bottom + 38, "middle", x_title);
   double y = kTop;
   for (const Bar& bar : bars) {
-    svg += text(kLeft - 8, y + 15, "end", bar.name, bar.is_ours ? "font-weight=\"bold\"" : "");
-    svg += fmt::format("<rect x=\"{}\" y=\"{:.1f}\" width=\"{:.1f}\" height=\"14\" fill=\"{}\"/>\n", kLeft,
-                       y + 4, std::max(1.0, x.at(bar.value) - kLeft), bar.is_ours ? "#c0392b" : "#7fb3d5");
+    svg += text(left - 8, y + 15, "end", bar.name, bar.is_ours ? "font-weight=\"bold\"" : "");
+    svg += fmt::format("<rect x=\"{}\" y=\"{:.1f}\" width=\"{:.1f}\" height=\"14\" fill=\"{}\"/>\n", left,
+                       y + 4, std::max(1.0, x.at(bar.value) - left), bar.is_ours ? "#c0392b" : "#7fb3d5");
     svg += fmt::format("<line x1=\"{:.1f}\" x2=\"{:.1f}\" y1=\"{:.1f}\" y2=\"{:.1f}\" stroke=\"black\"/>\n",
                        x.at(bar.lower), x.at(bar.upper), y + 11, y + 11);
     svg += text(x.at(bar.upper) + 6, y + 15, "start", plain(bar.value));
