@@ -240,7 +240,7 @@ std::string lines_svg(const std::string& title, const std::string& x_title, cons
 }
 
 std::string bars_svg(const std::string& title, const std::string& x_title, const std::vector<Bar>& bars) {
-  constexpr double kLeast = 230, kLetter = 7, kRight = 780, kTop = 44, kRow = 22;
+  constexpr double kLeast = 230, kLetter = 7.5, kRight = 780, kTop = 44, kRow = 22;
   std::size_t longest = 0;
   for (const Bar& bar : bars) longest = std::max(longest, bar.name.size());
   const double left = std::max(kLeast, kLetter * static_cast<double>(longest) + 16);

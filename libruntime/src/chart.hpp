@@ -50,7 +50,7 @@ inline constexpr float kLeastAngle =
 inline constexpr float kLeastCellStep = 0.03F;
 /// Nor is a step worth its while that brings the point nearer by less than this share of a depth step, as its
 /// linear model foretells: the map knows no better.
-inline constexpr float kLeastGain = 0.1F;
+inline constexpr float kLeastGain = 0.03F;
 /// The normal of a patch is replaced by the direction to its nearest point where the cosine between them is
 /// less than kBack, unless the point is so near, as a share of far_from(), that its side is in doubt.
 inline constexpr float kBack = -0.5F, kNearShare = 0.1F;

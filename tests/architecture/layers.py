@@ -46,7 +46,7 @@ VERSIONS = "apps/sqbench/machine.cpp"  # says with which versions of the peers i
 # Third-party libraries: how an include of theirs begins, and the only files that may hold one.
 THIRD_PARTY = {
     "Boost.Multiprecision": (("boost/multiprecision/",), ["tests/hard/reference.hpp"]),
-    "CGAL": (("CGAL/", "boost/"), ["libbake/src/heat_method.cpp", "libbake/src/hull.cpp", "libbake/src/oracle.cpp",
+    "CGAL": (("CGAL/", "boost/"), ["libbake/src/heat_method.cpp", "libbake/src/hull.cpp",
                                    "apps/sqbench/peer_cgal.cpp", VERSIONS]),
     "Ceres": (("ceres/", "glog/"), ["libbake/src/fit_surface.cpp"]),
     "Eigen": (("Eigen/", "unsupported/"), ["libbake/src/fit.cpp", "libbake/src/fit_model.cpp",
