@@ -308,7 +308,7 @@ inline void put(const Resident& resident, const Finding& finding, const Answers&
   if (!answers.signed_distance_m.empty())
     answers.signed_distance_m[to] = finding.signed_distance_m(resident.unit_m());
   if (!answers.normal.empty()) answers.normal[to] = finding.normal_vector();
-  if (!answers.surface_m.empty()) answers.surface_m[to] = resident.unit_m() * finding.surface_point();
+  if (!answers.surface_m.empty()) answers.surface_m[to] = resident.to_metres(finding.surface_point());
   if (!answers.part.empty()) answers.part[to] = finding.part;
   if (!answers.layer.empty()) answers.layer[to] = finding.layer;
   if (!answers.inside.empty()) answers.inside[to] = finding.is_inside() ? 1 : 0;
@@ -323,13 +323,12 @@ void query(const Resident& resident, std::span<const Vec3f> points_m, const Answ
   Chunk chunk;
   Findings findings;
   Answerer answerer(resident, options, wants);
-  const float scale = resident.units_per_m();
   for (std::size_t begin = 0; begin < points_m.size(); begin += kChunkPoints) {
     const auto count =
         static_cast<std::uint32_t>(std::min<std::size_t>(kChunkPoints, points_m.size() - begin));
     chunk.count = count;
     for (std::uint32_t i = 0; i < count; ++i) {
-      const Vec3f p = scale * points_m[begin + i];
+      const Vec3f p = resident.from_metres(points_m[begin + i]);
       chunk.x[i] = p.x;
       chunk.y[i] = p.y;
       chunk.z[i] = p.z;

@@ -2,15 +2,16 @@
 //
 // Bodies of blocks: walks the blocks that touch the object, a chunk at a time.
 
-/// The placement in float, into the units of the resident. For scale 1 the result is exactly units_per_m
-/// times what row . p + t gives in metres.
+/// The placement in float, into the frame of the resident. For scale 1 and an object close to its own origin
+/// the result is exactly units_per_m times what row . p + t gives in metres.
 inline AffineF placement_in_units(const Resident& resident, const BodyPlacement& placement) noexcept {
   const Rotation<double> r = rotation<double>(placement.object_from_body.orientation);
   const double units_per_m = resident.units_per_m();
   AffineF map;
   for (int k = 0; k < 3; ++k)
     map.row[k] = cast<float>((units_per_m * placement.scale) * r.row[static_cast<unsigned>(k)]);
-  map.translation = cast<float>(units_per_m * placement.object_from_body.translation_m);
+  map.translation = cast<float>(
+      units_per_m * (placement.object_from_body.translation_m - cast<double>(resident.origin_m())));
   return map;
 }
 HWY_INLINE V3 placed(const AffineF& map, const V3& p) {
@@ -148,8 +149,8 @@ class ContactCollector {
       contact.part = finding.part;
       contact.depth_m = unknown ? 0.0F : -distance_m;
       contact.normal = finding.normal_vector();
-      contact.position_m = resident_.unit_m() * Vec3f{chunk.x[i], chunk.y[i], chunk.z[i]};
-      contact.surface_m = resident_.unit_m() * finding.surface_point();
+      contact.position_m = resident_.to_metres({chunk.x[i], chunk.y[i], chunk.z[i]});
+      contact.surface_m = resident_.to_metres(finding.surface_point());
       if (query_.seek == Seek::kDeepest) {
         const bool better = found_ == 0 || contact.depth_m > deepest_.depth_m ||
                             (contact.depth_m == deepest_.depth_m && contact.point < deepest_.point);

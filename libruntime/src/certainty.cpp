@@ -18,7 +18,7 @@ constexpr float kShrink = 1 - 1.0F / 1024;
 
 Certainty certainty_of(const Resident& resident, const Vec3f& p_m) noexcept {
   if (!is_finite(p_m)) return Certainty::kUnsure;
-  const Vec3f p = resident.units_per_m() * p_m;
+  const Vec3f p = resident.from_metres(p_m);
   if (!in_ball(p, resident.sphere_centre(), resident.sphere_square())) return Certainty::kOutside;
   // Parts that hold the point by layer 1 itself go first: query() asks no others.
   bool is_held = false, is_beside = false, is_outside = false;

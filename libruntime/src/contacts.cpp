@@ -19,7 +19,8 @@ class NearPoints {
         points_m_(points_m),
         centre_m_(cast<float>(instance.object().sphere().centre_m)),
         // Wider than the object's own test by what float loses in it: the object decides.
-        reach_m_(static_cast<float>(instance.object().sphere().radius_m) * 1.00001F) {}
+        reach_m_(static_cast<float>(1.00001 * instance.object().sphere().radius_m +
+                                    1e-6 * norm(instance.object().sphere().centre_m))) {}
 
   /// Gathers the next points; false when there are no more.
   bool next() noexcept {

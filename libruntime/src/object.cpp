@@ -52,7 +52,7 @@ Answer Object::query(const Vec3f& p_m, const QueryOptions& options) const noexce
   const Resident& resident = impl_->resident;
   Answer answer;
   if (!is_finite(p_m)) return answer;
-  const Vec3f p = resident.units_per_m() * p_m;
+  const Vec3f p = resident.from_metres(p_m);
   if (!in_ball(p, resident.sphere_centre(), resident.sphere_square())) return answer;
 
   // Charts overlap. The nearest represented surface tells the distance, and the side too, unless another
@@ -88,7 +88,7 @@ Answer Object::query(const Vec3f& p_m, const QueryOptions& options) const noexce
       nearest = here.distance;
       answer.part = k;
       answer.normal = part.object_from_part.apply(here.normal);
-      answer.surface_m = resident.unit_m() * part.to_object(here.surface);
+      answer.surface_m = resident.to_metres(part.to_object(here.surface));
       nearest_faces = here.faces_patch;
       offset = here.offset;
       nearest_inside = here.inside;

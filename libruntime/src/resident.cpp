@@ -163,7 +163,13 @@ float square_of_ball(const BoundingSphere& sphere, double units_per_m) {
   return rounded_up(radius * radius);
 }
 
-PartRecord put_part(Layout& out, const Part& part, const Curves& curves, double units_per_m) {
+BoundingSphere seen_from(const Vec3f& origin_m, const BoundingSphere& sphere) {
+  return {sphere.centre_m - cast<double>(origin_m), sphere.radius_m};
+}
+
+PartRecord put_part(Layout& out, const Part& part, const Curves& curves, const Vec3f& origin_m,
+                    double units_per_m) {
+  const BoundingSphere sphere = seen_from(origin_m, part.sphere);
   const DistanceMap& map = part.map;
   PartRecord record;
   record.semi_axes = cast<float>(units_per_m * part.shape.semi_axes_m);
@@ -173,10 +179,11 @@ PartRecord put_part(Layout& out, const Part& part, const Curves& curves, double 
   record.power_ratio = static_cast<float>(part.shape.e2 / part.shape.e1);
   record.slabs = Slabs::of(record.inverse_axes, part.shape.e1, part.shape.e2);
   record.object_from_part = rotation<float>(part.object_from_part.orientation);
-  record.translation = cast<float>(units_per_m * part.object_from_part.translation_m);
-  record.sphere_centre = cast<float>(units_per_m * part.sphere.centre_m);
-  record.sphere_radius = rounded_up(units_per_m * part.sphere.radius_m);
-  record.sphere_square = square_of_ball(part.sphere, units_per_m);
+  record.translation =
+      cast<float>(units_per_m * (part.object_from_part.translation_m - cast<double>(origin_m)));
+  record.sphere_centre = cast<float>(units_per_m * sphere.centre_m);
+  record.sphere_radius = rounded_up(units_per_m * sphere.radius_m);
+  record.sphere_square = square_of_ball(sphere, units_per_m);
   record.depth_min = static_cast<float>(units_per_m * map.depth_min_m);
   record.depth_step = static_cast<float>(units_per_m * map.depth_step_m);
   record.rows = map.rows;
@@ -256,16 +263,21 @@ Resident::Resident(const Asset& asset) : part_count_(static_cast<std::uint32_t>(
   std::frexp(asset.sphere.radius_m, &exponent);
   unit_m_ = std::ldexp(1.0F, std::clamp(exponent, -126, 126));
   const double units_per_m = 1 / double{unit_m_};
-  sphere_centre_ = cast<float>(units_per_m * asset.sphere.centre_m);
-  sphere_radius_ = rounded_up(units_per_m * asset.sphere.radius_m);
-  sphere_square_ = square_of_ball(asset.sphere, units_per_m);
+  // From farther off the object's parts and the points asked for would lose digits to where it lies.
+  constexpr double kFarRadii = 8;
+  if (norm(asset.sphere.centre_m) > kFarRadii * asset.sphere.radius_m)
+    origin_m_ = cast<float>(asset.sphere.centre_m);
+  const BoundingSphere sphere = seen_from(origin_m_, asset.sphere);
+  sphere_centre_ = cast<float>(units_per_m * sphere.centre_m);
+  sphere_radius_ = rounded_up(units_per_m * sphere.radius_m);
+  sphere_square_ = square_of_ball(sphere, units_per_m);
   const std::vector<PartRecord> blank(part_count_);
   std::vector<Curves> curves;
   for (const Part& part : asset.parts) curves.emplace_back(part.shape);
   const auto lay_out = [&](Layout& out) {
     out.put(blank.data(), blank.size() * sizeof(PartRecord));
     for (std::uint32_t k = 0; k < part_count_; ++k) {
-      const PartRecord record = put_part(out, asset.parts[k], curves[k], units_per_m);
+      const PartRecord record = put_part(out, asset.parts[k], curves[k], origin_m_, units_per_m);
       if (bytes_) std::memcpy(bytes_.get() + k * sizeof(PartRecord), &record, sizeof record);
     }
     out.put(std::uint32_t{0});

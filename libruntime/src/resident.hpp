@@ -124,6 +124,11 @@ class Resident {
 
   float unit_m() const noexcept { return unit_m_; }
   float units_per_m() const noexcept { return 1 / unit_m_; }
+  /// The resident's own frame: units of unit_m from a place near the object. An object close to its own
+  /// origin keeps that.
+  const Vec3f& origin_m() const noexcept { return origin_m_; }
+  Vec3f from_metres(const Vec3f& p_m) const noexcept { return units_per_m() * (p_m - origin_m_); }
+  Vec3f to_metres(const Vec3f& p) const noexcept { return unit_m_ * p + origin_m_; }
   const Vec3f& sphere_centre() const noexcept { return sphere_centre_; }  ///< of the object, in units
   /// Of a ball that surely holds whatever layer 1 calls inside.
   float sphere_square() const noexcept { return sphere_square_; }
@@ -188,6 +193,7 @@ class Resident {
   std::size_t size_{};
   std::uint32_t part_count_{};
   float unit_m_{1};
+  Vec3f origin_m_;
   Vec3f sphere_centre_;
   float sphere_radius_{}, sphere_square_{};
 };
