@@ -7,10 +7,8 @@
 namespace sqmap::apps {
 namespace {
 
-// As large as most files are: size tells little about the time, and neither does anything else that can be
-// had without a bake. Open edges, pieces and handles counted as well, the slowest of 16 shards of 138 meshes
-// takes 1.8 times the mean in place of 2.0 (scripts/score_shards), and every mesh would have to be imported
-// for it.
+// As large as most files are: their size tells little about the time (scripts/score_shards). Times of an
+// earlier bake tell more.
 constexpr std::uint64_t kFixedCost = 1'000'000;
 
 /// Estimate over seconds: the median of the inputs that have a time; 1 where none has.
