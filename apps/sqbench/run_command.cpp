@@ -32,11 +32,16 @@ constexpr std::array<bench::Suite, 8> kSuites{{
 
 struct RunArguments {
   std::string suite;
-  std::vector<std::filesystem::path> meshes{"build/meshes/elephant.off", "build/meshes/camel.off",
-                                            "build/meshes/hand.off",     "build/meshes/armadillo.off",
-                                            "build/meshes/lion.off",     "build/meshes/dino.off"};
+  std::vector<std::filesystem::path> meshes;
   std::filesystem::path bundles = "build/bundles", probe = "build/meshes/hand.off", out;
   bool is_smoke = false;
+
+  /// Those of build/meshes where none is named. Two show that all runs.
+  void choose_meshes() {
+    if (!meshes.empty()) return;
+    for (const char* name : {"elephant", "camel", "hand", "armadillo", "lion", "dino"})
+      if (!is_smoke || meshes.size() < 2) meshes.push_back(std::string("build/meshes/") + name + ".off");
+  }
 
   /// The line that repeats this run, without folders that differ from machine to machine.
   std::string command() const {
@@ -134,14 +139,19 @@ std::function<Exit(Console&)> declare_run(CLI::App& app) {
   app.add_option("SUITE", args->suite, "One of those above, or all")
       ->required()
       ->check(CLI::IsMember(names).description(""));
-  app.add_option("--meshes", args->meshes, "Objects (default: six of build/meshes)")->type_name("FILE...");
+  app.add_option("--meshes", args->meshes, "Objects (default: six of build/meshes, with --smoke two)")
+      ->type_name("FILE...");
   app.add_option("--bundles", args->bundles, "Folder of their bundles, STEM.h5 (default build/bundles)")
       ->type_name("DIR");
   app.add_option("--probe", args->probe, "Mesh of the moving body (default build/meshes/hand.off)")
       ->type_name("FILE");
   app.add_option("-o,--out", args->out, "Folder for the results")->required()->type_name("DIR");
-  app.add_flag("--smoke", args->is_smoke, "A few poses and points: shows that all runs, times mean little");
-  return [args](Console& console) { return run_suites(console, *args); };
+  app.add_flag("--smoke", args->is_smoke,
+               "A few poses and points, under a minute: shows that all runs, times mean little");
+  return [args](Console& console) {
+    args->choose_meshes();
+    return run_suites(console, *args);
+  };
 }
 
 }  // namespace sqmap::apps
