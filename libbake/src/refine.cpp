@@ -26,8 +26,8 @@ constexpr double kWorstError = 0.2;
 constexpr double kRefineShare = 0.7;
 // A split pays if it lowers the error by more than this share of what each part of a full count may err.
 constexpr double kPartPrice = 0.3;
-// Splits that paid took off half of what their piece erred, or less: one that errs by less than this many
-// prices is left alone.
+// Few splits take off more than half of what their piece errs: one that errs by less than this many prices is
+// left alone.
 constexpr double kWorthSplitting = 2;
 // Which piece is split goes by its share of the error and, this much, by its share of the volume that
 // superquadrics enclose beside the mesh: where that is large maps see the surface from far off and at a

@@ -15,8 +15,7 @@ constexpr std::uint32_t kLeafSize = 8;
 /// around six animals of libcgal-demo and a sphere of 1.3e6 faces, is 0.007; first order left 0.024 at 2.5
 /// radii.
 constexpr double kFarRadii = 2;
-/// For a first look: the largest error measured, with the same points and around three broken meshes, is
-/// 0.07.
+/// For a first look, which decides what is farther than kRoughError from a half.
 constexpr double kRoughRadii = 1.2;
 constexpr double kRoughError = 0.12;
 

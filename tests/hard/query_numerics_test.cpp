@@ -264,6 +264,11 @@ TEST(FarFromTheOrigin, AMeshFarFromItsOwnOriginErrsLikeTheObject) {
         if (r < 0.5) continue;
         ++met;
         ASSERT_NEAR(contacts[k].depth_m, kRadius - r, kMapError) << sizes_away;
+        // Places are told in float round the mesh's origin again.
+        const double spacing_m = 0x1p-22 * norm(t_m);
+        const Vec3d there_m = cast<double>(near_origin[contacts[k].point]) + t_m;
+        ASSERT_NEAR(norm(cast<double>(contacts[k].position_m) - there_m), 0, spacing_m + 1e-6);
+        ASSERT_NEAR(norm(cast<double>(contacts[k].surface_m) - t_m), kRadius, kMapError + spacing_m);
       }
     }
   });
