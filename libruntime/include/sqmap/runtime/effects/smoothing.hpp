@@ -14,8 +14,8 @@ namespace sqmap::runtime {
 /// The paper filters the stored map, whose texels are unequal in size and differ between charts; neighbours
 /// at a length in metres also blend across charts. The stencil does not turn with the normal, because one
 /// that does jumps where the normal jumps. Bias: on a ball of radius R the depth shrinks by 2 h^2 / (7 (R -
-/// depth)), in a hollow it grows by 2 h^2 / (7 (R + depth)), on a plane there is none. Six queries a contact.
-/// A neighbour without a distance counts as the contact itself.
+/// depth)), in a hollow it grows by 2 h^2 / (7 (R + depth)), on a plane there is none. Six queries a contact,
+/// asked in batches. A neighbour without a distance counts as the contact itself.
 struct Smoothing {
   static constexpr const char* kName = "smoothing";
 
