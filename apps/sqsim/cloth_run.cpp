@@ -100,8 +100,9 @@ Outcome run_cloth(Console& console, const LoadedScene& loaded, const RunOptions&
   const double step_s = 1 / loaded.file.rate_hz;
   const auto frames = static_cast<std::size_t>(std::llround(loaded.file.seconds * loaded.file.rate_hz));
   std::vector<TraceRow> rows(std::max<std::size_t>(frames, 1));
-  std::vector<double> whole_us, ours_us;
+  std::vector<double> whole_us, processor_us, ours_us;
   whole_us.reserve(rows.size());
+  processor_us.reserve(rows.size());
   ours_us.reserve(rows.size());
   FrameClock clock(loaded.file.rate_hz, options.is_fast);
   for (std::size_t i = 0; i < rows.size(); ++i) {
@@ -111,6 +112,7 @@ Outcome run_cloth(Console& console, const LoadedScene& loaded, const RunOptions&
     const Collided collided = collide(cloth, obstacles, entry, query);
     ours_us.push_back(std::chrono::duration<double, std::micro>(Clock::now() - fallen).count());
     whole_us.push_back(clock.end());
+    processor_us.push_back(clock.processor_us());
     rows[i] = {static_cast<double>(i + 1) * step_s,
                {{}, centre_of(cloth.nodes_m())},
                cast<float>((1 / step_s) * collided.impulse_n_s),
@@ -123,10 +125,9 @@ Outcome run_cloth(Console& console, const LoadedScene& loaded, const RunOptions&
   console.out(fmt::format("cloth of {} nodes, {} frames at {} Hz{}\n", cloth.nodes_m().size(), rows.size(),
                           loaded.file.rate_hz, options.is_fast ? ", not waited for" : ""));
   console.out("collision alone:\n" + latency_text(ours_us));
-  console.out(fmt::format("with Bullet's cloth: median {:.1f} us, 99.9 % {:.1f} us, worst {:.1f} us\n",
-                          percentile(whole_us, 0.5), percentile(whole_us, 0.999), percentile(whole_us, 1)));
-  console.out(fmt::format("missed deadlines: {} ({} of them begun late by the system)\n", clock.missed(),
-                          clock.overslept()));
+  console.out(fmt::format("with Bullet's cloth: {}; of the processor alone: {}\n", percentiles_text(whole_us),
+                          percentiles_text(processor_us)));
+  console.out(missed_text(clock));
   console.out(
       fmt::format("last frame: {} of {} nodes in contact\n", rows.back().contacts, cloth.nodes_m().size()));
   if (options.output.empty()) return Done{};

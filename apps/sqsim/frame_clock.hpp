@@ -3,6 +3,7 @@
 
 #include <chrono>
 #include <cstddef>
+#include <ctime>
 #include <thread>
 
 namespace sqmap::apps {
@@ -20,31 +21,43 @@ class FrameClock {
     if (!is_fast_) std::this_thread::sleep_until(due_);
     begun_ = Clock::now();
     if (is_fast_) due_ = begun_;
-    woke_late_ = begun_ - due_ > period_ / 2;
+    begun_processor_ = processor_time();
   }
-  /// Length of the frame's work [microseconds].
+  /// Length of the frame [microseconds].
   double end() {
+    const auto used = processor_time() - begun_processor_;
     const Clock::time_point now = Clock::now();
     due_ += period_;
     if (now > due_) {
       ++missed_;
-      if (woke_late_) ++overslept_;
+      if (used < period_) ++kept_waiting_;
       due_ = now;
     }
+    processor_us_ = std::chrono::duration<double, std::micro>(used).count();
     return std::chrono::duration<double, std::micro>(now - begun_).count();
   }
+  /// What the last frame had of the processor [microseconds].
+  double processor_us() const noexcept { return processor_us_; }
 
   std::size_t missed() const noexcept { return missed_; }
-  /// Of missed(): frames that the system began more than half a period late.
-  std::size_t overslept() const noexcept { return overslept_; }
+  /// Of missed(): frames that had less than a period of the processor. What made them late is the system's.
+  std::size_t kept_waiting() const noexcept { return kept_waiting_; }
 
  private:
   using Clock = std::chrono::steady_clock;
+  /// Of this thread.
+  static std::chrono::nanoseconds processor_time() noexcept {
+    timespec time{};
+    clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
+    return std::chrono::seconds(time.tv_sec) + std::chrono::nanoseconds(time.tv_nsec);
+  }
+
   Clock::duration period_;
   bool is_fast_;
   Clock::time_point due_, begun_;
-  bool woke_late_ = false;
-  std::size_t missed_ = 0, overslept_ = 0;
+  std::chrono::nanoseconds begun_processor_{};
+  double processor_us_ = 0;
+  std::size_t missed_ = 0, kept_waiting_ = 0;
 };
 
 }  // namespace sqmap::apps

@@ -28,9 +28,17 @@ std::string latency_text(std::span<const double> microseconds) {
   for (const auto& [bin, count] : bins)
     text += fmt::format("{:>9.4g} .. {:<9.4g} {:>8} {}\n", std::exp2(bin), std::exp2(bin + 1), count,
                         std::string((40 * count + fullest - 1) / fullest, '#'));
-  return text + fmt::format("median {:.1f} us, 99.9 % {:.1f} us, worst {:.1f} us\n",
-                            percentile(microseconds, 0.5), percentile(microseconds, 0.999),
-                            percentile(microseconds, 1));
+  return text + percentiles_text(microseconds) + "\n";
+}
+
+std::string percentiles_text(std::span<const double> microseconds) {
+  return fmt::format("median {:.1f} us, 99.9 % {:.1f} us, worst {:.1f} us", percentile(microseconds, 0.5),
+                     percentile(microseconds, 0.999), percentile(microseconds, 1));
+}
+
+std::string missed_text(const FrameClock& clock) {
+  return fmt::format("missed deadlines: {} ({} by frames that had less than a period of the processor)\n",
+                     clock.missed(), clock.kept_waiting());
 }
 
 }  // namespace sqmap::apps

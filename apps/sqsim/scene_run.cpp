@@ -4,6 +4,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <fmt/format.h>
@@ -33,7 +34,8 @@ Outcome write_outputs(const LoadedScene& scene, const std::vector<TraceRow>& row
 
 /// What a run comes to besides its rows.
 struct RunReport {
-  std::size_t missed{}, overslept{};
+  FrameClock clock;
+  std::vector<double> processor_us;  ///< of each frame
   std::size_t part_count{}, resident_bytes{};
 };
 
@@ -53,6 +55,8 @@ Result<RunReport> run_once(const LoadedScene& loaded, const runtime::Probe& prob
   const std::optional<BudgetEntry>& allowed = loaded.file.budget;
   runtime::WorkRate rate;
 
+  std::vector<double> processor_us;
+  processor_us.reserve(rows.size());
   FrameClock clock(loaded.file.rate_hz, is_fast);
   for (std::size_t i = 0; i < rows.size(); ++i) {
     TraceRow& row = rows[i];
@@ -76,12 +80,13 @@ Result<RunReport> run_once(const LoadedScene& loaded, const runtime::Probe& prob
     row.layer = static_cast<int>(result.layer);
     row.work_units = budget.spent;
     row.microseconds = clock.end();
+    processor_us.push_back(clock.processor_us());
     rate.learn(budget.spent, row.microseconds);
     for (std::size_t k = 0; k < objects.size(); ++k)
       for (const runtime::Contact& contact : scene.contacts(k))
         row.deepest_m = std::max(row.deepest_m, static_cast<double>(contact.depth_m));
   }
-  return RunReport{clock.missed(), clock.overslept(), scene.part_count(), scene.resident_bytes()};
+  return RunReport{clock, std::move(processor_us), scene.part_count(), scene.resident_bytes()};
 }
 
 /// How many frames had to do with which layer.
@@ -125,8 +130,12 @@ Outcome run_probe(Console& console, const LoadedScene& loaded, const RunOptions&
                           static_cast<double>(run.resident_bytes) / 1024, probe.points_m.size(), rows.size(),
                           rate_hz, options.is_fast ? ", not waited for" : ""));
   console.out(latency_text(microseconds));
-  console.out(
-      fmt::format("missed deadlines: {} ({} of them begun late by the system)\n", run.missed, run.overslept));
+  std::vector<double> touching_us;
+  for (std::size_t i = 0; i < rows.size(); ++i)
+    if (rows[i].contacts > 0) touching_us.push_back(run.processor_us[i]);
+  console.out(fmt::format("of the processor alone: {}; in contact: {}\n", percentiles_text(run.processor_us),
+                          percentiles_text(touching_us)));
+  console.out(missed_text(run.clock));
   if (options.runs > 1) {
     std::vector<TraceRow> again(rows.size());
     for (int k = 1; k < options.runs; ++k) {
@@ -136,11 +145,8 @@ Outcome run_probe(Console& console, const LoadedScene& loaded, const RunOptions&
       for (std::size_t i = 0; i < again.size(); ++i)
         microseconds[i] = std::min(microseconds[i], again[i].microseconds);
     }
-    console.out(
-        fmt::format("each frame's shortest time in {} runs: median {:.1f} us, 99.9 % {:.1f} us, worst "
-                    "{:.1f} us\n",
-                    options.runs, percentile(microseconds, 0.5), percentile(microseconds, 0.999),
-                    percentile(microseconds, 1)));
+    console.out(fmt::format("each frame's shortest time in {} runs: {}\n", options.runs,
+                            percentiles_text(microseconds)));
   }
   if (loaded.file.budget) console.out(budget_text(*loaded.file.budget, rows));
   const Jumps jumps = force_jumps(rows);

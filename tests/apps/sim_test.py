@@ -57,7 +57,11 @@ class Simulation(FolderTest):
         self.assertEqual((last["contacts"], last["layer"]), (1, 3))
         self.assertEqual((rows[0]["contacts"], rows[0]["force_z_n"]), (0, 0))
         self.assertRegex(self.result.stdout, r"median [\d.]+ us, 99.9 % [\d.]+ us, worst [\d.]+ us")
-        self.assertRegex(self.result.stdout, r"missed deadlines: \d+ \(")
+        self.assertRegex(self.result.stdout, r"missed deadlines: \d+ \(\d+ by frames ")
+        processor = re.search(r"of the processor alone: median ([\d.]+) us.*worst ([\d.]+) us; in contact: ",
+                              self.result.stdout)
+        self.assertLess(0, float(processor[1]))
+        self.assertLessEqual(float(processor[1]), float(processor[2]))
         self.assertRegex(self.result.stdout, r"force jumps > 10 %: \d+ of \d+ steps")
 
     def test_writes_a_plot_and_a_picture(self):
