@@ -221,11 +221,25 @@ HWY_NOINLINE void Answerer::combine(Findings& findings) noexcept {
 HWY_NOINLINE void Answerer::offset(Findings& findings) noexcept {
   const float edge = resident_.units_per_m() * options_.edge_length_m;
   for (std::uint32_t k = 0; k < findings.count; ++k) {
+    const std::int32_t nearest = findings.of[findings.points[k]].nearest_entry;
+    if (nearest >= 0) entries_.flags[nearest] |= kAnswer;
+  }
+  for (std::uint32_t r = 0; r < entries_.range_count; ++r) {
+    const EntryRange& range = entries_.ranges[r];
+    const PartRecord& part = resident_.part(range.part);
+    const Chart chart(resident_, part, charts_.table(range.part));
+    const Looker looker(resident_, part, chart, options_);
+    for (std::uint32_t i = range.begin; i < range.end; i += lane_count()) {
+      const VI flags = hn::LoadU(kDI, entries_.flags + i);
+      const M answers = as_float(hn::Ne(hn::And(flags, hn::Set(kDI, kAnswer)), hn::Zero(kDI)));
+      if (none(hn::And(answers, hn::FirstN(kD, range.end - i)))) continue;
+      const V row = hn::LoadU(kD, entries_.row + i), col = hn::LoadU(kD, entries_.col + i);
+      hn::StoreU(looker.offset(row, col, edge), kD, entries_.certainty + i);
+    }
+  }
+  for (std::uint32_t k = 0; k < findings.count; ++k) {
     Finding& finding = findings.of[findings.points[k]];
-    if (finding.nearest_entry < 0) continue;
-    const Chart chart(resident_, resident_.part(finding.part), charts_.table(finding.part));
-    finding.offset = chart.offset(entries_.row[finding.nearest_entry], entries_.col[finding.nearest_entry],
-                                  options_.level, edge);
+    if (finding.nearest_entry >= 0) finding.offset = entries_.certainty[finding.nearest_entry];
   }
 }
 

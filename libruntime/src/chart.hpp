@@ -260,8 +260,8 @@ inline float Chart::convex_curvature(float row, float col, std::uint32_t stride)
     const Cell cell = cell_at(r, wrapped(c), stride);
     const float half = static_cast<float>(stride) / 2;
     const float mid_row = static_cast<float>(cell.row) + half, mid_col = static_cast<float>(cell.col) + half;
-    return Centre{patch_at(cell, mid_row, mid_col, stride).point,
-                  patch_normal(cell, mid_row, mid_col, stride), cell.eligible};
+    const Patch patch = patch_at(cell, mid_row, mid_col, stride);
+    return Centre{patch.point, normalized(cross(patch.col, patch.row)), cell.eligible};
   };
   const auto step = static_cast<float>(stride);
   const float last = static_cast<float>(part_.rows - 1) - 0.5F;

@@ -22,6 +22,7 @@ enum EntryFlag : std::int32_t {
   kWithin = 64,   ///< layer 2 cannot rule out that the surface is as near as Wants::reach
   kWanted = 128,  ///< its surface and normal will be asked for
   kOther = 256,   ///< layer 3 may begin again at (other_row, other_col)
+  kAnswer = 512,  ///< the nearest of its point: its distance is the answer
 };
 
 struct EntryRange {
@@ -34,8 +35,9 @@ struct alignas(64) Entries {
   float x[kLength], y[kLength], z[kLength];  ///< part frame
   std::int32_t point[kLength];               ///< place in the chunk
   std::int32_t flags[kLength];
-  float row[kLength], col[kLength], crossing[kLength], distance[kLength], certainty[kLength];
-  std::int32_t start[kLength];                    ///< of inner points for layer 3: Resident::start
+  float row[kLength], col[kLength], crossing[kLength], distance[kLength];
+  float certainty[kLength];     ///< of those with kAnswer, once they are combined: ChartAnswer::offset
+  std::int32_t start[kLength];  ///< of inner points for layer 3: Resident::start
   float other_row[kLength], other_col[kLength];   ///< the foot, until layer 3 begins
   float surface[3][kLength], normal[3][kLength];  ///< part frame; in the end those wanted, in the object's
   EntryRange ranges[kMostRanges];

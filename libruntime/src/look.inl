@@ -129,6 +129,8 @@ class Looker {
     const VPatch patch = patch_at(cell, limited(row, all(kBesidePole), all(last_row_ - kBesidePole)), col);
     return normalized3(cross3(patch.col, patch.row));
   }
+  /// Chart::offset.
+  SQMAP_KERNEL V offset(V row, V col, float edge) const noexcept;
   HWY_INLINE M block_holds(const SideList& list, VI texel) const noexcept {
     static_assert(Resident::kBlock == 8);
     const VI block = hn::ShiftRight<3>(texel);
@@ -174,6 +176,33 @@ class Looker {
   bool third_;
   float last_row_, turn_, size_, inverse_size_;
 };
+
+SQMAP_KERNEL V Looker::offset(V row, V col, float edge) const noexcept {
+  struct Centre {
+    V3 point, normal;
+    M eligible;
+  };
+  const auto centre_at = [&](V r, V c) HWY_ATTR {
+    VCell cell = cell_at(r, wrapped(c));
+    const M eligible = read(cell).eligible;
+    const V half = all(size_ / 2);
+    const VPatch patch = patch_at(cell, to_float(cell.row) + half, to_float(cell.col) + half);
+    return Centre{patch.point, normalized3(cross3(patch.col, patch.row)), eligible};
+  };
+  const V zero = hn::Zero(kD), last = all(last_row_ - 0.5F);
+  const Centre here = centre_at(row, col);
+  V curvature = zero;
+  for (const auto& [d_row, d_col] : {std::pair{size_, 0.0F}, {-size_, 0.0F}, {0.0F, size_}, {0.0F, -size_}}) {
+    const Centre there = centre_at(limited(row + all(d_row), zero, last), col + all(d_col));
+    const V3 d = there.point - here.point;
+    const V square = dot3(d, d);
+    const M counts = hn::And(there.eligible, hn::Gt(square, zero));
+    const V here_most = most(curvature, dot3(there.normal - here.normal, d) / square);
+    curvature = pick(counts, here_most, curvature);
+  }
+  const V bend = all(edge) * curvature, one = all(1.0F), three = all(3.0F);
+  return all(edge) * bend / (three * (one + hn::Sqrt(one + bend * bend / three)));
+}
 
 SQMAP_KERNEL Look Looker::look(const V3& p, M wanted, float reach) const noexcept {
   const VFoot foot = foot_of(chart_.table(), p);
