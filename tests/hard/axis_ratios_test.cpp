@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Needles, plates and blades of axis ratios 10, 100 and 1000 in all permutations, against searches.
+// Needles, plates and blades of axis ratios 10, 100 and 1000 in all permutations, on every instruction set,
+// against searches.
 #include <algorithm>
 #include <cmath>
 #include <random>
@@ -72,6 +73,7 @@ TEST_P(AxisRatios, DepthsBelowShellsAreThoseOfASearchInLayersTwoAndThree) {
       const auto object = Object::build(test::shell_asset(shape, depth_m, 33, 64));
       ASSERT_TRUE(object.ok());
       const reference::SurfaceSearch search(shape);
+      std::vector<Vec3f> points;
       for (int i = 0; i < 8; ++i) {
         Vec3d d{axes.x * unit(rng), axes.y * unit(rng), axes.z * unit(rng)};
         if (i == 6) d[static_cast<int>(rng() % 3)] = 0;
@@ -79,6 +81,7 @@ TEST_P(AxisRatios, DepthsBelowShellsAreThoseOfASearchInLayersTwoAndThree) {
             cast<float>((0.75 * std::cbrt(std::abs(unit(rng))) / inside_outside_radial(shape, d)) * d);
         const double below_m = search.distance_m(cast<double>(p));
         if (!(below_m > depth_m)) continue;
+        points.push_back(p);
         const Answer two = object.value().query(p, {Layer::kTwo}),
                      three = object.value().query(p, {Layer::kThree});
         for (const auto& [answer, errors] : {std::pair{&two, &second}, {&three, &third}}) {
@@ -87,6 +90,8 @@ TEST_P(AxisRatios, DepthsBelowShellsAreThoseOfASearchInLayersTwoAndThree) {
           ASSERT_NEAR(norm(answer->normal), 1, 1e-4) << test::name_of(shape);
         }
       }
+      for (const Layer layer : {Layer::kTwo, Layer::kThree})
+        EXPECT_TRUE(test::every_target_agrees(object.value(), points, {layer})) << test::name_of(shape);
     }
   record("layer_2", second);
   record("layer_3", third);
@@ -128,10 +133,12 @@ TEST_P(AxisRatios, LayerThreeTellsTheDistanceToSlimEllipsoids) {
       ASSERT_TRUE(object.ok());
       const reference::SurfaceSearch search({axes, 1, 1});
       const double thin_m = std::min({axes.x, axes.y, axes.z});
+      std::vector<Vec3f> points;
       for (int i = 0; i < 12; ++i) {
         const Vec3d d = normalized(Vec3d{unit(rng), unit(rng), unit(rng)});
         const double reach = 1 + 0.15 * unit(rng);
         const Vec3f p = cast<float>(Vec3d{reach * axes.x * d.x, reach * axes.y * d.y, reach * axes.z * d.z});
+        points.push_back(p);
         const double exact_m = (reach < 1 ? -1 : 1) * search.distance_m(cast<double>(p));
         (reach < 1 ? inside : outside)++;
         const Answer two = object.value().query(p, {Layer::kTwo}),
@@ -141,6 +148,8 @@ TEST_P(AxisRatios, LayerThreeTellsTheDistanceToSlimEllipsoids) {
           errors->wrong_side += answer->inside != (reach < 1) && std::abs(exact_m) > 0.02 * thin_m;
         }
       }
+      for (const Layer layer : {Layer::kTwo, Layer::kThree})
+        EXPECT_TRUE(test::every_target_agrees(object.value(), points, {layer}));
     }
   record("layer_2", second);
   record("layer_3", third);

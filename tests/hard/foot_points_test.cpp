@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// Plane foot points that a rule by direction misses by up to 71 degrees, in float and double, and as shells
-// on every instruction set, against a search over the superellipse.
+// Foot points in float and double, against searches over the surface: plane ones that a rule by direction
+// misses by up to 71 degrees, those as shells on every instruction set too, and those of hard shapes.
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <random>
+#include <string>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -12,6 +15,7 @@
 #include "sqmap/runtime/object.hpp"
 
 #include "hard/shells.hpp"
+#include "hard/surface_search.hpp"
 
 namespace sqmap {
 namespace {
@@ -90,7 +94,7 @@ TEST(PlaneFootPoints, AreThoseOfShellsOnEveryTarget) {
     ASSERT_TRUE(object.ok());
     std::vector<Vec3f> points;
     for (const auto& sign : kSigns) points.push_back(cast<float>(Vec3d{sign[0] * c.x, sign[1] * c.y, 0}));
-    const int targets = test::for_each_target([&](runtime::SimdTarget target) {
+    test::for_each_target([&](runtime::SimdTarget target) {
       for (const runtime::Layer layer : {runtime::Layer::kTwo, runtime::Layer::kThree}) {
         test::Batch batch(points.size());
         object.value().query(points, batch.answers(), {layer});
@@ -104,12 +108,77 @@ TEST(PlaneFootPoints, AreThoseOfShellsOnEveryTarget) {
         }
       }
     });
-    EXPECT_GE(targets, 1);
   }
   RecordProperty("worst_deg", std::to_string(worst_deg));
   RecordProperty("worst_m", std::to_string(worst_m * 1e6) + "e-6");
   EXPECT_LT(worst_deg, 2e-3);
   EXPECT_LT(worst_m, 1e-5);
+}
+
+/// Shapes whose feet are alike hard to find, and how many may be missed.
+struct FootClass {
+  std::string name;
+  std::vector<Vec3d> axes;
+  std::vector<double> exponents;
+  double
+      most_missed;  ///< share of points whose foot is farther than the nearest by 0.1 % of the shape's size
+  double most_off;  ///< of the depth from the distance to the nearest, as a share of the size
+};
+const std::vector<Vec3d> kCompact{{1, 1, 1}, {1, 0.7, 0.5}, {0.5, 0.9, 1}};
+const FootClass kFootClasses[] = {
+    {"round", kCompact, {0.5, 1.0, 1.5}, 0.005, 2e-3},
+    {"near_boxes", kCompact, {0.1}, 0.02, 0.02},
+    {"pointed", kCompact, {1.9, 2.0}, 0.01, 2e-3},
+    {"mixed_exponents", kCompact, {0.1, 0.5, 2.0}, 0.015, 0.015},
+    {"needles_and_plates",
+     {{0.1, 0.1, 1}, {1, 0.1, 1}, {0.01, 1, 1}, {1, 0.01, 0.01}},
+     {0.3, 1.0},
+     0.09,
+     0.012},
+    {"thousand_to_one", {{0.001, 0.001, 1}, {1, 0.001, 1}, {1, 0.03, 0.001}}, {0.3, 1.0, 1.7}, 0.015, 0.01}};
+
+template <class T>
+class HardFeet : public testing::Test {};
+TYPED_TEST_SUITE(HardFeet, Scalars);
+
+// Known weakness, by kind of shape: the search starts from the nearest of 8 x 8 places of an octant and takes
+// three steps. Where two faces are nearly as near it may end on the other, and on slim shapes beside the
+// nearest place, from where the depth, a projection on the normal, may also be less.
+TYPED_TEST(HardFeet, AreTheNearestButForTheSharesStated) {
+  using T = TypeParam;
+  std::mt19937_64 rng(76);
+  std::uniform_real_distribution<double> unit(-1, 1);
+  for (const FootClass& kind : kFootClasses) {
+    int count = 0, missed = 0;
+    double most = 0, least = 0;
+    for (const Vec3d& axes : kind.axes)
+      for (const double e1 : kind.exponents)
+        for (const double e2 : kind.exponents) {
+          const Superquadric shape{axes, e1, e2};
+          const ShapeTable<T> table(shape, 65, 128);
+          const reference::SurfaceSearch search(shape);
+          const double size = norm(axes);
+          for (int i = 0; i < 120 / static_cast<int>(kind.exponents.size() * kind.exponents.size()); ++i) {
+            const Vec3d d{axes.x * unit(rng), axes.y * unit(rng), axes.z * unit(rng)};
+            const double reach = i % 8 == 0 ? 1 : std::cbrt(std::abs(unit(rng)));
+            const Vec3<T> m = cast<T>((reach / inside_outside_radial(shape, d)) * d);
+            const Foot<T> foot = table.foot(m);
+            const double nearest_m = search.distance_m(cast<double>(m));
+            const double off = (std::abs(static_cast<double>(foot.depth_m)) - nearest_m) / size;
+            ASSERT_TRUE(std::isfinite(off)) << test::name_of(shape);
+            ++count;
+            missed += off > 1e-3;
+            most = std::max(most, off);
+            least = std::min(least, off);
+          }
+        }
+    SCOPED_TRACE(kind.name);
+    this->RecordProperty(kind.name, std::to_string(missed) + " of " + std::to_string(count) + ", most " +
+                                        std::to_string(most) + ", least " + std::to_string(least));
+    EXPECT_GE(count, 300);
+    EXPECT_LE(missed, kind.most_missed * count);
+    EXPECT_LE(std::max(most, -least), kind.most_off);
+  }
 }
 
 }  // namespace

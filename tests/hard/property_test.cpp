@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// Claims over random points and paths. Each says which branches its cases took, and fails where one was never
-// taken.
+// Claims over random points and paths, of the answers of every instruction set. Each says which branches its
+// cases took, and fails where one was never taken.
 #include <cmath>
 #include <string>
+#include <vector>
 
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
@@ -21,8 +22,11 @@ const bool kIsSeeded = test::seed_rapidcheck("seed=2007 max_success=1000");
 
 using test::Branches;
 using test::check;
+using test::every_target_agrees;
 using test::share;
 using test::vector;
+
+using Points = std::vector<Vec3f>;
 
 Object built(const Asset& asset) { return std::move(Object::build(asset)).value(); }
 
@@ -34,6 +38,7 @@ TEST(Inside, IsWhereTheSignedDistanceIsNegativeOnEveryLayerAndLevel) {
     const Layer layer = *rc::gen::element(Layer::kAuto, Layer::kTwo, Layer::kThree);
     const auto level = *rc::gen::inRange(0U, 4U);
     const Answer answer = object.query(cast<float>(p), {layer, level});
+    RC_ASSERT(every_target_agrees(object, Points{cast<float>(p)}, {layer, level}));
     if (std::isnan(answer.signed_distance_m)) {
       branches.take(answer.part == kNowhere ? "nowhere" : "no distance");
       RC_ASSERT(answer.part != kNowhere || !answer.inside);
@@ -55,6 +60,8 @@ TEST(Layers, AFinerOneNeverFindsAPointInsideThatLayerOneFindsOutside) {
     const Vec3f p = cast<float>(Vec3d{1.2 * share(), 0.8 * share(), 0.4 + 1.2 * share()});
     const bool conservative = object.query(p, {Layer::kOne}).inside;
     const bool two = object.query(p, {Layer::kTwo}).inside, three = object.query(p, {Layer::kThree}).inside;
+    for (const Layer layer : {Layer::kOne, Layer::kTwo, Layer::kThree})
+      RC_ASSERT(every_target_agrees(object, Points{p}, {layer}));
     branches.take(conservative ? two ? "in both" : "in the superquadric only" : "outside");
     RC_ASSERT(conservative || (!two && !three));
   });
@@ -88,6 +95,9 @@ TEST(Gradient, OfTheFieldOfLayerTwoIsItsNormalAtEveryBranch) {
     const Vec3d along = normalized(vector() + Vec3d{1e-3, 0, 0});
     const float ahead = object.query(cast<float>(p + kStep_m * along), {Layer::kTwo}).signed_distance_m,
                 behind = object.query(cast<float>(p - kStep_m * along), {Layer::kTwo}).signed_distance_m;
+    RC_ASSERT(every_target_agrees(
+        object, Points{cast<float>(p), cast<float>(p + kStep_m * along), cast<float>(p - kStep_m * along)},
+        {Layer::kTwo}));
     RC_PRE(std::isfinite(ahead) && std::isfinite(behind));
     // Where the three do not look at the same sheet there is a ridge, the medial axis between the two.
     const double bend = std::abs(double(ahead) - 2.0 * here.signed_distance_m + behind);
@@ -126,6 +136,7 @@ TEST(ThirdLayer, GoingByTheDistanceAgainstTheNormalLeadsToTheSurface) {
     RC_ASSERT(std::abs(norm(foot - kCentre) - kRadius) < 1e-3 + slide_m * slide_m / kRadius + 0.06 * slide_m);
     RC_ASSERT(norm(foot - cast<double>(answer.surface_m)) < 1e-3 + slide_m);
     RC_ASSERT(std::abs(object.query(cast<float>(foot), {Layer::kThree}).signed_distance_m) < 2e-3);
+    RC_ASSERT(every_target_agrees(object, Points{cast<float>(p), cast<float>(foot)}, {Layer::kThree}));
   });
   branches.expect({"inside", "outside"}, 200);
 }
@@ -139,9 +150,11 @@ TEST(Force, AlongAPathOverABallChangesNoFasterThanItsStiffnessAllows) {
     Vec3d p = kCentre + (kRadius - 0.015 + 0.02 * share()) * normalized(vector() + Vec3d{0, 0, 0.01});
     Vec3f before = reaction_force(object.query(cast<float>(p), {Layer::kThree}), kStiffness);
     const Vec3d along = normalized(vector() + Vec3d{0.01, 0, 0});
+    Points path{cast<float>(p)};
     for (int k = 0; k < 40; ++k) {
       p = p + kStep_m * normalized(along + 0.5 * Vec3d{std::sin(k), std::cos(2.0 * k), std::sin(3.0 * k)});
       if (norm(p - kCentre) < 0.5) break;  // towards the centre directions change at once
+      path.push_back(cast<float>(p));
       const Vec3f now = reaction_force(object.query(cast<float>(p), {Layer::kThree}), kStiffness);
       branches.take(norm(now) > 0      ? norm(before) > 0 ? "in contact" : "enters"
                     : norm(before) > 0 ? "leaves"
@@ -152,6 +165,7 @@ TEST(Force, AlongAPathOverABallChangesNoFasterThanItsStiffnessAllows) {
                 kStiffness * (1.1F * static_cast<float>(kStep_m) + 1e-3F + 0.06F * depth));
       before = now;
     }
+    RC_ASSERT(every_target_agrees(object, path, {Layer::kThree}));
   });
   branches.expect({"in contact", "enters", "leaves", "free"}, 20);
 }
@@ -172,18 +186,21 @@ TEST(Energy, ClosedLoopsUnderTheSurfaceOfABallReturnWhatTheyTook) {
     RC_PRE(norm(u) > 0.5 && norm(v) > 0.5);
     double work_j = 0, turned_j = 0;
     constexpr int kSteps = 400;
+    Points loop;
     for (int k = 0; k < kSteps; ++k) {
       const auto at = [&](double step) {
         const double turn = step * 2 * 3.14159265358979 / kSteps;
         return middle + radius_m * (std::cos(turn) * u + std::sin(turn) * v);
       };
       const Vec3d way = at(k + 1) - at(k);
-      const Vec3f force = reaction_force(object.query(cast<float>(at(k + 0.5)), {Layer::kThree}), kStiffness);
+      loop.push_back(cast<float>(at(k + 0.5)));
+      const Vec3f force = reaction_force(object.query(loop.back(), {Layer::kThree}), kStiffness);
       work_j += dot(cast<double>(force), way);
       turned_j += std::abs(dot(cast<double>(force), way));
     }
     net_j += work_j;
     passed_j += turned_j;
+    RC_ASSERT(every_target_agrees(object, loop, {Layer::kThree}));
     ++loops;
     // Facets of the map tilt the force by up to 0.05 rad, to both sides.
     RC_ASSERT(std::abs(work_j) <= 0.03 * turned_j + 2e-4);

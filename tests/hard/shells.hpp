@@ -5,13 +5,11 @@
 #pragma once
 
 #include <array>
-#include <random>
 #include <string>
 #include <vector>
 
-#include "sqmap/runtime/object.hpp"
-
 #include "support/analytic_asset.hpp"
+#include "support/targets.hpp"
 
 namespace sqmap::test {
 
@@ -19,23 +17,6 @@ inline constexpr std::array<double, 5> kExponents{0.1, 0.3, 1.0, 1.9, 2.0};
 inline constexpr std::array<Vec3d, 7> kHardAxes{Vec3d{1, 1, 1},   {0.1, 1, 1},     {1, 0.1, 0.1},
                                                 {0.5, 1, 0.01},   {0.01, 0.01, 1}, {1, 0.001, 1},
                                                 {1, 0.001, 0.001}};
-inline constexpr std::array<runtime::SimdTarget, 4> kTargets{
-    runtime::SimdTarget::kBaseline, runtime::SimdTarget::kSse4, runtime::SimdTarget::kAvx2,
-    runtime::SimdTarget::kAvx512};
-
-/// Sets each instruction set that this processor has, one after the other, and the one before at the end.
-template <class Run>
-int for_each_target(const Run& run) {
-  const runtime::SimdTarget before = runtime::simd_target();
-  int count = 0;
-  for (const runtime::SimdTarget target : kTargets) {
-    if (!runtime::set_simd_target(target)) continue;
-    run(target);
-    ++count;
-  }
-  runtime::set_simd_target(before);
-  return count;
-}
 
 /// One part; every ray enters the material at depth_m.
 inline Asset shell_asset(const Superquadric& shape, double depth_m, std::uint32_t rows = 17,
@@ -50,17 +31,6 @@ inline Asset shell_asset(const Superquadric& shape, double depth_m, std::uint32_
   part.map.depth_step_m = depth_m / part.map.code.front();
   return asset_of({part}, 2 * part.sphere.radius_m);
 }
-
-/// Answers of the batch in use.
-struct Batch {
-  explicit Batch(std::size_t count)
-      : distance_m(count), normal(count), surface_m(count), part(count), layer(count), inside(count) {}
-  runtime::Answers answers() { return {distance_m, normal, surface_m, part, layer, inside}; }
-  std::vector<float> distance_m;
-  std::vector<Vec3f> normal, surface_m;
-  std::vector<std::uint32_t> part;
-  std::vector<std::uint8_t> layer, inside;
-};
 
 inline std::string name_of(const Superquadric& s) {
   return "axes " + std::to_string(s.semi_axes_m.x) + " " + std::to_string(s.semi_axes_m.y) + " " +
