@@ -119,6 +119,20 @@ std::string printable(std::string_view text) {
   return result;
 }
 
+namespace {
+
+/// Whether a text holds this name, and not only as a part of a longer one, such as that of its sidecar.
+bool names(std::string_view text, std::string_view name) {
+  constexpr std::string_view kEnds = " :;,`'\")";
+  for (std::size_t at = text.find(name); at != std::string_view::npos; at = text.find(name, at + 1)) {
+    const std::size_t end = at + name.size();
+    if (end == text.size() || kEnds.find(text[end]) != std::string_view::npos) return true;
+  }
+  return false;
+}
+
+}  // namespace
+
 std::string message_for(std::string_view file, const Error& error) {
   const std::size_t slash = file.find_last_of('/');
   const std::string quoted_name =
@@ -126,7 +140,7 @@ std::string message_for(std::string_view file, const Error& error) {
   std::string message(file);
   if (error.finding.starts_with(quoted_name)) {
     message += error.finding.substr(quoted_name.size());  // readers of bytes know no folder
-  } else if (error.finding.find(file) != std::string::npos) {
+  } else if (names(error.finding, file)) {
     message = error.finding;
   } else {
     message += ": " + error.finding;

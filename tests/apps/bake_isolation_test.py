@@ -108,9 +108,11 @@ class Isolation(FolderTest):
         self.assertEqual(records_of(result.stdout)[0]["outcome"], "timeout")
         self.assertIn("0.05 s", result.stderr)
         self.assertIn("(timeout 0.05s, command line)", result.stderr)
-        sidecar = self.models / "b.sqbake.toml"
+        sidecar = self.models / "b.off.sqbake.toml"
         sidecar.write_text('unit = "mm"\ntimeout = "0.04s"\n', encoding="ascii")
-        self.assertIn(f"(timeout 0.04s, {sidecar}:2)", run("sqbake", "bake", source, "-o", self.folder / "b.h5").stderr)
+        told = run("sqbake", "bake", source, "-o", self.folder / "b.h5").stderr
+        self.assertIn(f"(timeout 0.04s, {sidecar}:2)", told)
+        self.assertTrue(told.startswith(f"sqbake: error: {source}: "), told)  # though the sidecar's name holds it
         self.assertFalse((self.folder / "b.h5").exists())
 
     @unittest.skipIf(IS_ASAN, "AddressSanitizer's own maps exceed any limit")
