@@ -3,9 +3,10 @@
 import json
 import os
 import shutil
+import subprocess
 import unittest
 
-from support import FolderTest, ROUGH, box, run, sphere, write_off
+from support import NOBODY, FolderTest, ROUGH, box, run, sphere, write_off
 
 from bake_build_test import write_gltf, write_obj
 
@@ -180,6 +181,23 @@ class Cache(FolderTest):
         self.assertEqual((stats["results"], stats["bundles"], stats["outputs"], stats["bytes"]), (0, 0, 0, 0))
         missing = run("sqbake", "cache", "stats", "--cache", self.folder / "none")
         self.assert_exit(missing, 3)
+
+    def test_verify_and_gc_do_not_pass_over_what_they_may_not_remove(self):
+        self.bake()
+        self.folder.chmod(0o755)
+        try:
+            run("sqbake", "--version", **NOBODY).check_returncode()
+        except (OSError, subprocess.CalledProcessError) as problem:
+            self.skipTest(f"nobody may not start sqbake here: {problem}")
+        kept = [p for p in (self.cache / "v1" / "objects").rglob("*") if p.is_file()]
+        kept[0].write_bytes(kept[0].read_bytes() + b"x")
+        for arguments, words in ((("verify",), ["1 damaged\n", kept[0].name]), (("gc", "--max-size", "1"), ["removed 0 "])):
+            result = run("sqbake", "cache", *arguments, "--cache", self.cache, **NOBODY)
+            self.assert_exit(result, 3)
+            for word in words:
+                self.assertIn(word, result.stdout)
+            self.assertRegex(result.stderr, rf"^sqbake: error: {self.cache}: \d+ files? could not be removed; ")
+        self.assertTrue(all(path.exists() for path in kept))
 
 
 class Environment(FolderTest):

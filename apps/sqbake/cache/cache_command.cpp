@@ -66,6 +66,15 @@ Exit print_stats(Console& console, const CacheStore& store, const CacheArguments
   return Exit::kOk;
 }
 
+/// Files that could not be removed are there still, and so is the damage or the size.
+Exit end_of(Console& console, const CacheStore& store, std::uint64_t refused, Exit otherwise) {
+  if (refused == 0) return otherwise;
+  return refuse(console, {Status::kFileUnwritable,
+                          fmt::format("{}: {} {} could not be removed", store.folder().string(), refused,
+                                      refused == 1 ? "file" : "files"),
+                          "run it where the cache can be written"});
+}
+
 Exit print_verification(Console& console, const CacheStore& store, const CacheArguments& arguments) {
   const Result<CacheVerification> taken = verify_cache(store);
   if (!taken) return refuse(console, store.folder().string(), taken.error());
@@ -78,10 +87,12 @@ Exit print_verification(Console& console, const CacheStore& store, const CacheAr
     console.out(json_text(json));
   } else {
     for (const std::string& line : verification.damaged) console.out(line + "\n");
-    console.out(fmt::format("{} results, {} bundles; {} damaged, removed\n", verification.results,
-                            verification.objects, verification.damaged.size()));
+    console.out(fmt::format("{} results, {} bundles; {} damaged{}\n", verification.results,
+                            verification.objects, verification.damaged.size(),
+                            verification.refused == 0 ? ", removed" : ""));
   }
-  return verification.damaged.empty() ? Exit::kOk : Exit::kSomeFailed;
+  return end_of(console, store, verification.refused,
+                verification.damaged.empty() ? Exit::kOk : Exit::kSomeFailed);
 }
 
 Exit print_collection(Console& console, const CacheStore& store, const CacheArguments& arguments) {
@@ -103,7 +114,7 @@ Exit print_collection(Console& console, const CacheStore& store, const CacheArgu
                             collection.removed_temporary_files, collection.bytes_after,
                             collection.bytes_before));
   }
-  return Exit::kOk;
+  return end_of(console, store, collection.refused, Exit::kOk);
 }
 
 void add_gc_options(CLI::App& gc, CollectLimits& limits) {

@@ -76,16 +76,23 @@ Result<Inventory> take_inventory(const CacheStore& store) {
   return inventory;
 }
 
-/// True where the file is gone now.
-bool removed(const StoredFile& file) {
+enum class Removal { kDone, kVanished, kRefused };
+
+Removal removal_of(const StoredFile& file) {
   std::error_code code;
-  return fs::remove(file.path, code);
+  if (fs::remove(file.path, code)) return Removal::kDone;
+  return code ? Removal::kRefused : Removal::kVanished;
 }
 
-/// Removes files that `condition` picks; the number of them.
+/// Removes files that `condition` picks; the number of them. Adds those that stay to `refused`.
 template <class Condition>
-std::uint64_t remove_if(std::vector<StoredFile>& files, Condition condition) {
-  return std::erase_if(files, [&](const StoredFile& file) { return condition(file) && removed(file); });
+std::uint64_t remove_if(std::vector<StoredFile>& files, std::uint64_t& refused, Condition condition) {
+  return std::erase_if(files, [&](const StoredFile& file) {
+    if (!condition(file)) return false;
+    const Removal removal = removal_of(file);
+    if (removal == Removal::kRefused) ++refused;
+    return removal == Removal::kDone;
+  });
 }
 
 /// The object a result names; empty for one that leads to side files or is damaged.
@@ -98,13 +105,13 @@ std::string object_named_by(const StoredFile& result) {
 
 /// Removes the longest unused results until the rest and what they name fits.
 std::uint64_t remove_until_it_fits(Inventory& inventory, const std::map<std::string, std::string>& object_of,
-                                   std::uint64_t max_bytes) {
+                                   std::uint64_t max_bytes, std::uint64_t& refused) {
   std::map<std::string, std::uint64_t> object_bytes, users;
   for (const StoredFile& object : inventory.objects) object_bytes[object.name] = object.bytes;
   for (const StoredFile& result : inventory.results) ++users[object_of.at(result.name)];
   std::uint64_t total = inventory.bytes();
   std::ranges::stable_sort(inventory.results, std::greater<>(), &StoredFile::age);
-  return remove_if(inventory.results, [&](const StoredFile& result) {
+  return remove_if(inventory.results, refused, [&](const StoredFile& result) {
     if (total <= max_bytes) return false;
     total -= result.bytes;
     const std::string& object = object_of.at(result.name);
@@ -114,10 +121,11 @@ std::uint64_t remove_until_it_fits(Inventory& inventory, const std::map<std::str
 }
 
 /// Removes the notes on the longest untouched outputs until the rest fits: what else may go has gone.
-std::uint64_t remove_outputs_until_it_fits(Inventory& inventory, std::uint64_t max_bytes) {
+std::uint64_t remove_outputs_until_it_fits(Inventory& inventory, std::uint64_t max_bytes,
+                                           std::uint64_t& refused) {
   std::uint64_t total = inventory.bytes();
   std::ranges::stable_sort(inventory.outputs, std::greater<>(), &StoredFile::age);
-  return remove_if(inventory.outputs, [&](const StoredFile& output) {
+  return remove_if(inventory.outputs, refused, [&](const StoredFile& output) {
     if (total <= max_bytes) return false;
     total -= output.bytes;
     return true;
@@ -125,11 +133,12 @@ std::uint64_t remove_outputs_until_it_fits(Inventory& inventory, std::uint64_t m
 }
 
 /// Removes bundles that no result names any more, and those that none ever named.
-std::uint64_t remove_objects(Inventory& inventory, const std::map<std::string, std::string>& object_of) {
+std::uint64_t remove_objects(Inventory& inventory, const std::map<std::string, std::string>& object_of,
+                             std::uint64_t& refused) {
   std::set<std::string> named_before, named;
   for (const auto& [result, object] : object_of) named_before.insert(object);
   for (const StoredFile& result : inventory.results) named.insert(object_of.at(result.name));
-  return remove_if(inventory.objects, [&](const StoredFile& object) {
+  return remove_if(inventory.objects, refused, [&](const StoredFile& object) {
     return !named.contains(object.name) && (named_before.contains(object.name) || object.age > kGrace);
   });
 }
@@ -153,16 +162,21 @@ Result<CacheStatistics> cache_statistics(const CacheStore& store) {
 Result<CacheVerification> verify_cache(const CacheStore& store) {
   Result<Inventory> inventory = take_inventory(store);
   if (!inventory) return inventory.error();
-  CacheVerification verification{inventory.value().results.size(), inventory.value().objects.size(), {}};
+  CacheVerification verification{inventory.value().results.size(), inventory.value().objects.size(), {}, 0};
+  const auto report = [&](const StoredFile& file, std::string finding) {
+    const Removal removal = removal_of(file);
+    if (removal == Removal::kVanished) return;
+    if (removal == Removal::kRefused) ++verification.refused;
+    verification.damaged.push_back(std::move(finding));
+  };
   std::set<std::string> intact;
   for (const StoredFile& object : inventory.value().objects) {
     const std::optional<HashedFile> file = hash_file(object.path);
     if (!file) continue;
     if (file->hash == object.name) {
       intact.insert(object.name);
-    } else if (removed(object)) {
-      verification.damaged.push_back(
-          fmt::format("bundle {}: its bytes have the hash {}", object.name, file->hash));
+    } else {
+      report(object, fmt::format("bundle {}: its bytes have the hash {}", object.name, file->hash));
     }
   }
   for (const StoredFile& result : inventory.value().results) {
@@ -170,13 +184,10 @@ Result<CacheVerification> verify_cache(const CacheStore& store) {
     if (!bytes) continue;
     const std::optional<CacheResult> parsed = parse_result(bytes.value());
     if (!parsed) {
-      if (removed(result))
-        verification.damaged.push_back(fmt::format("result {}: cannot be read", result.name));
+      report(result, fmt::format("result {}: cannot be read", result.name));
     } else if (!parsed->object.empty() && !intact.contains(parsed->object) &&
                !stamp_of(store.objects() / parsed->object.substr(0, 2) / parsed->object)) {
-      if (removed(result))
-        verification.damaged.push_back(
-            fmt::format("result {}: its bundle {} is missing", result.name, parsed->object));
+      report(result, fmt::format("result {}: its bundle {} is missing", result.name, parsed->object));
     }
   }
   return verification;
@@ -188,21 +199,22 @@ Result<CacheCollection> collect_cache(const CacheStore& store, const CollectLimi
   Inventory& inventory = taken.value();
   CacheCollection collection;
   collection.bytes_before = inventory.bytes();
+  std::uint64_t& refused = collection.refused;
   collection.removed_temporary_files =
-      remove_if(inventory.temporary, [](const StoredFile& file) { return file.age > kGrace; });
+      remove_if(inventory.temporary, refused, [](const StoredFile& file) { return file.age > kGrace; });
   std::map<std::string, std::string> object_of;  // by result
   for (const StoredFile& result : inventory.results) object_of[result.name] = object_named_by(result);
   if (limits.max_age) {
     const auto is_old = [&](const StoredFile& file) { return file.age > *limits.max_age; };
-    collection.removed_results = remove_if(inventory.results, is_old);
-    collection.removed_outputs = remove_if(inventory.outputs, is_old);
-    collection.removed_objects = remove_objects(inventory, object_of);
+    collection.removed_results = remove_if(inventory.results, refused, is_old);
+    collection.removed_outputs = remove_if(inventory.outputs, refused, is_old);
+    collection.removed_objects = remove_objects(inventory, object_of, refused);
   }
   if (limits.max_bytes)
-    collection.removed_results += remove_until_it_fits(inventory, object_of, *limits.max_bytes);
-  collection.removed_objects += remove_objects(inventory, object_of);
+    collection.removed_results += remove_until_it_fits(inventory, object_of, *limits.max_bytes, refused);
+  collection.removed_objects += remove_objects(inventory, object_of, refused);
   if (limits.max_bytes)
-    collection.removed_outputs += remove_outputs_until_it_fits(inventory, *limits.max_bytes);
+    collection.removed_outputs += remove_outputs_until_it_fits(inventory, *limits.max_bytes, refused);
   collection.bytes_after = inventory.bytes();
   return collection;
 }

@@ -23,7 +23,8 @@ struct CacheStatistics {
 
 struct CacheVerification {
   std::uint64_t results{}, objects{};  ///< looked at
-  std::vector<std::string> damaged;    ///< what was wrong, one line each; these files are gone now
+  std::vector<std::string> damaged;    ///< what was wrong, one line each; these files are gone now, but for
+  std::uint64_t refused{};             ///< these, which could not be removed
 };
 
 struct CollectLimits {
@@ -33,6 +34,7 @@ struct CollectLimits {
 
 struct CacheCollection {
   std::uint64_t removed_results{}, removed_objects{}, removed_outputs{}, removed_temporary_files{};
+  std::uint64_t refused{};  ///< files that should go, but could not be removed
   std::uint64_t bytes_before{}, bytes_after{};
 };
 
