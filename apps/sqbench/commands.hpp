@@ -8,5 +8,6 @@
 namespace sqmap::apps {
 
 std::function<Exit(Console&)> declare_run(CLI::App& app);
+std::function<Exit(Console&)> declare_draw(CLI::App& app);
 
 }  // namespace sqmap::apps

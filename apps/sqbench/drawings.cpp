@@ -110,18 +110,18 @@ void draw_two_spheres(Results& results) {
   double longest_m = 0;
   const std::vector<std::uint8_t> map = map_picture(model, longest_m);
   const std::string title = "Fig. 4 of the paper: an object of two spheres as one superquadric";
-  std::string svg =
-      drawing_svg(title, 400,
-                  image(value_of(apps::part_picture(model.asset, kSide)), 20, 40, 2.0 * kSide, kSide) +
-                      image(map, 560, 80, 2.8 * kRows, 1.4 * kRows),
-                  {{20 + kSide / 2.0, 320,
-                    fmt::format("superquadric: semi-axes {:.3g}, {:.3g}, {:.3g}", shape.semi_axes_m.x,
-                                shape.semi_axes_m.y, shape.semi_axes_m.z)},
-                   {20 + kSide / 2.0, 338,
-                    fmt::format("radii of the spheres, e1 = {:.3g}, e2 = {:.3g}", shape.e1, shape.e2)},
-                   {20 + 1.5 * kSide, 320, "the surface that its map represents"},
-                   {700, 240, fmt::format("map, {} x {}; white: {:.3g} radii", kRows, kCols, longest_m)}});
-  results.drawings.push_back({"fig04", title, std::move(svg)});
+  std::string svg = drawing_svg(
+      title, 360,
+      image(value_of(apps::part_picture(model.asset, kSide)), 20, 40, 2.0 * kSide, kSide) +
+          image(map, 560, 80, 2.8 * kRows, 1.4 * kRows),
+      {{20 + kSide / 2.0, 320,
+        fmt::format("superquadric: semi-axes {:.3g}, {:.3g}, {:.3g}", shape.semi_axes_m.x,
+                    shape.semi_axes_m.y, shape.semi_axes_m.z)},
+       {20 + kSide / 2.0, 338,
+        fmt::format("radii of the spheres, e1 = {:.3g}, e2 = {:.3g}", shape.e1, shape.e2)},
+       {20 + 1.5 * kSide, 320, "the surface that its map represents"},
+       {700, 240, fmt::format("map, {} x {}; black: 0, white: {:.3g} radii", kRows, kCols, longest_m)}});
+  results.drawings.push_back({kDrawings[0], title, std::move(svg)});
 }
 
 }  // namespace
@@ -143,7 +143,8 @@ void draw_objects(const SuiteInput& input, Results& results) {
     if (x == 20) y += 240;
   }
   const std::string title = "Fig. 10 of the paper: superquadrics, and the surface of their maps";
-  results.drawings.push_back({"fig10", title, drawing_svg(title, y + (x > 20 ? 250 : 10), images, captions)});
+  results.drawings.push_back(
+      {kDrawings[1], title, drawing_svg(title, y + (x > 20 ? 250 : 10), images, captions)});
 }
 
 }  // namespace sqmap::bench

@@ -7,11 +7,14 @@
 #include <cstdint>
 #include <filesystem>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "sqmap/asset/result.hpp"
 
 namespace sqmap::bench {
+
+inline constexpr double kKilobyte = 1024;  ///< of every KB that is shown
 
 /// Median and quartiles of the repetitions.
 struct Spread {
@@ -114,6 +117,9 @@ struct CheckRow {
   bool holds{};
 };
 
+/// Pictures that no numbers belong to.
+inline constexpr const char* kDrawings[] = {"fig04", "fig10"};
+
 struct Picture {
   std::string name, title, svg;
 };
@@ -140,6 +146,8 @@ struct Results {
 Machine this_machine(bool is_pinned);
 
 std::string results_json(const Results& results);
+/// What results_json() wrote, to its six digits; drawings are not in it.
+Result<Results> results_from_json(std::string_view text);
 std::string results_csv(const Results& results);
 /// The page, and the pictures it shows as files of their own.
 std::vector<Picture> pictures(const Results& results);

@@ -12,6 +12,7 @@
 
 #include "../common/files.hpp"
 #include "commands.hpp"
+#include "page_files.hpp"
 #include "suites.hpp"
 #include "timing.hpp"
 
@@ -51,23 +52,16 @@ struct RunArguments {
   }
 };
 
-Exit report(Console& console, const std::filesystem::path& file, const Error& error) {
-  console.error(message_for(file.string(), error));
-  return exit_for(error.status);
-}
-
+/// The page is drawn from what the file says, so that it cannot say more.
 Exit write_all(Console& console, const std::filesystem::path& folder, const bench::Results& results) {
-  std::error_code problem;
-  std::filesystem::create_directories(folder, problem);
-  const std::vector<bench::Picture> pictures = bench::pictures(results);
-  std::vector<std::pair<std::string, std::string>> files{
-      {"results.json", bench::results_json(results)},
-      {"results.csv", bench::results_csv(results)},
-      {"index.html", bench::results_page(results, pictures)}};
-  for (const bench::Picture& picture : pictures) files.emplace_back(picture.name + ".svg", picture.svg);
-  for (const auto& [name, text] : files)
-    if (const Outcome written = write_file(folder / name, text); !written)
-      return report(console, folder / name, written.error());
+  const std::string text = bench::results_json(results);
+  Result<bench::Results> told = bench::results_from_json(text);
+  if (!told) return report(console, folder / "results.json", told.error());
+  told.value().drawings = results.drawings;
+  const Exit drawn = write_page(console, folder, told.value());
+  if (drawn != Exit::kOk) return drawn;
+  if (const Outcome written = write_file(folder / "results.json", text); !written)
+    return report(console, folder / "results.json", written.error());
   return Exit::kOk;
 }
 

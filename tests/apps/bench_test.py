@@ -418,6 +418,10 @@ class Smoke(SmokeRun):
         row = self.rows("frames", model="ball", work="grasp", peer="cgal-closest")[0]
         self.assertEqual(float(rows["frames", "ball", "grasp", "cgal-closest", "us.median"]), row["us"]["median"])
         self.assertEqual(len({r["table"] for r in table}), 12)
+        self.assertEqual(len(rows), len(table), "two numbers go by one name")
+        budget = self.rows("budgets", model="brick", family="sqmap-layer3")[0]
+        self.assertEqual(float(rows["budgets", "brick", "32768 bytes", "sqmap-layer3", "us.median"]),
+                         budget["us"]["median"])
 
     def test_compare_finds_a_slower_frame_and_only_that(self):
         before, after = self.folder / "a.json", self.folder / "b.json"
@@ -445,6 +449,42 @@ class Smoke(SmokeRun):
         less_accurate = compare(before, after)
         self.assertEqual(less_accurate.returncode, 1)
         self.assertEqual(less_accurate.stdout.count(" worse"), 1)
+
+
+class Draw(SmokeRun):
+    """sqbench draw, on the results of the smoke run."""
+
+    def drawn(self, results, *pictures):
+        source, out = self.folder / "kept", self.folder / "drawn"
+        source.mkdir(exist_ok=True)
+        (source / "bench.json").write_text(results if isinstance(results, str) else json.dumps(results), encoding="utf-8")
+        for name in pictures:
+            (source / name).write_text(self.files[name], encoding="utf-8")
+        shutil.rmtree(out, ignore_errors=True)
+        done = run("sqbench", "draw", source / "bench.json", "-o", out)
+        files = {path.name: path.read_text(encoding="utf-8") for path in out.iterdir()} if out.exists() else {}
+        return done, files
+
+    def test_files_are_those_of_the_run(self):
+        done, files = self.drawn(self.files["results.json"], "fig04.svg", "fig10.svg")
+        self.assert_exit(done, 0)
+        self.assertEqual(files, {name: text for name, text in self.files.items() if name != "results.json"})
+
+    def test_pictures_of_objects_that_are_missing_are_left_out_and_named(self):
+        done, files = self.drawn(self.files["results.json"])
+        self.assert_exit(done, 0)
+        self.assertIn("fig04.svg: left out", done.stderr)
+        self.assertEqual(self.files.keys() - files.keys(), {"results.json", "fig04.svg", "fig10.svg"})
+
+    def test_what_is_no_result_is_refused(self):
+        lacking = json.loads(self.files["results.json"])
+        del lacking["frames"][0]["us"]["median"]
+        for results, words in (("words", "no JSON"), ({"schema": "other"}, "sqmap.bench/1"), ({**lacking}, "median"),
+                               ({**self.results, "models": 3}, "schema")):
+            refused, files = self.drawn(results)
+            self.assert_exit(refused, 4)
+            self.assertIn(words, refused.stderr)
+            self.assertEqual(files, {})
 
 
 class Table(SmokeRun):

@@ -6,7 +6,7 @@ import unittest
 from support import run
 
 COMMANDS = {"sqbake": ["bake", "check", "config", "cache", "report", "plan", "merge"],
-            "sqinfo": ["show", "validate", "query", "export", "diff"], "sqbench": ["run"]}
+            "sqinfo": ["show", "validate", "query", "export", "diff"], "sqbench": ["run", "draw"]}
 
 
 class Help(unittest.TestCase):
