@@ -46,9 +46,9 @@ class Search {
       Vec3d within = q;
       for (int axis = 0; axis < 3; ++axis)
         within[axis] = std::clamp(q[axis], model_.low_m[axis], model_.high_m[axis]);
-      // Outside the box the way to it is a lower bound good enough to march with.
-      const double outside_m = norm(q - within);
-      const double d = outside_m > 0 ? outside_m : field_.sample(q);
+      // Outside the box a lower bound, as the way on from it to the object turns by a right angle or more.
+      const double outside_m = norm(q - within), from_box_m = field_.sample(within);
+      const double d = outside_m > 0 ? std::hypot(outside_m, std::max(0.0, from_box_m)) : from_box_m;
       state.least_m = std::min(state.least_m, d);
       if (d < 0) ++state.contacts;
     }
@@ -170,12 +170,14 @@ Sequence make_sequence(const Model& model, const Probe& probe, Contact contact, 
   double least_m = std::numeric_limits<double>::infinity();
   std::size_t contacts = 0, near = 0;
   const double band_m = kBand * model.r_max_m();
+  const double margin_m = 3 * band_m;  // the nearest point of a probe that is far is beyond the band
   for (const Placement& placement : sequence.object_from_probe)
     for (const Vec3f& p : probe.cloud.points_m) {
       const Vec3d q = cast<double>(placement.apply(p));
       bool is_near = true;
       for (int axis = 0; axis < 3; ++axis)
-        is_near = is_near && q[axis] >= model.low_m[axis] - band_m && q[axis] <= model.high_m[axis] + band_m;
+        is_near =
+            is_near && q[axis] >= model.low_m[axis] - margin_m && q[axis] <= model.high_m[axis] + margin_m;
       if (!is_near) continue;
       const double d = model.oracle->signed_distance(q);
       least_m = std::min(least_m, d);

@@ -285,6 +285,8 @@ class Smoke(SmokeRun):
                 self.assertLess(row["deepest_percent"], 3)
                 if row["work"] == "far":
                     self.assertEqual(row["near_mean"], 0)
+                    self.assertGreater(row["nearest_percent"], 3)
+                    self.assertLess(row["nearest_percent"], 7)  # no method can tell from the bounds alone
         for row in self.rows("frames", work="far"):
             if row["peer"] != "sqmap-layer1":  # all it knows are superquadrics
                 self.assertEqual(row["answers_mean"], 0, row)
