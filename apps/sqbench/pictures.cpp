@@ -3,6 +3,8 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <set>
+#include <string>
 #include <utility>
 
 #include <fmt/format.h>
@@ -51,11 +53,11 @@ void add_accuracy(const Results& results, std::vector<Picture>& pictures) {
         const auto bytes = static_cast<double>(peer->bytes);
         const std::string label =
             fmt::format("{}: {:.3g} %, {:.3g} ns a point, {:.3g} KB, normals {:.2g} deg", row.peer,
-                        row.mean_error_percent, row.ns.median, bytes / 1e3, row.normal_mean_deg);
+                        row.mean_error_percent, row.ns.median, bytes / kKilobyte, row.normal_mean_deg);
         const double shown_percent = std::max(row.mean_error_percent, kLeastError_percent);
         time.add(peer->family, {shown_percent, row.ns.median, bytes, label});
-        size.add(peer->family, {shown_percent, bytes / 1e3, bytes, label});
-        angle.add(peer->family, {std::max(row.normal_mean_deg, 0.1), bytes / 1e3, bytes, label});
+        size.add(peer->family, {shown_percent, bytes / kKilobyte, bytes, label});
+        angle.add(peer->family, {std::max(row.normal_mean_deg, 0.1), bytes / kKilobyte, bytes, label});
       }
       if (time.series.empty()) continue;
       const std::string name = fmt::format("{}-{}", model.model, shell == 3.0 ? "3" : "05");
@@ -96,7 +98,7 @@ class Means {
       const auto mean = [&](double value) { return std::exp(value / static_cast<double>(sum.count)); };
       by_family.add(sum.family, {mean(sum.x), mean(sum.y), mean(sum.bytes),
                                  fmt::format("{}: {:.3g} {}, {:.3g} {}, {:.3g} KB", sum.name, mean(sum.x),
-                                             x_unit, mean(sum.y), y_unit, mean(sum.bytes) / 1e3)});
+                                             x_unit, mean(sum.y), y_unit, mean(sum.bytes) / kKilobyte)});
     }
     return by_family.series;
   }
@@ -119,24 +121,24 @@ void add_means(const Results& results, std::vector<Picture>& pictures) {
     const auto bytes = static_cast<double>(peer->bytes);
     time.add(row.peer, peer->family, std::max(row.mean_error_percent, kLeastError_percent), row.ns.median,
              bytes);
-    angle.add(row.peer, peer->family, std::max(row.normal_mean_deg, 0.1), bytes / 1e3, bytes);
+    angle.add(row.peer, peer->family, std::max(row.normal_mean_deg, 0.1), bytes / kKilobyte, bytes);
   }
   for (const BudgetRow& row : results.budgets)
-    budget.add(fmt::format("{} in {:g} KB", row.family, row.budget_bytes / 1024), row.family,
+    budget.add(fmt::format("{} in {:g} KB", row.family, row.budget_bytes / kKilobyte), row.family,
                row.mean_error_percent, row.us.median, static_cast<double>(row.bytes));
   const auto add = [&](const char* name, const std::string& title, const std::string& x, const char* y,
                        const std::vector<Series>& series) {
     if (!series.empty()) pictures.push_back({name, title, scatter_svg(title, x, y, series)});
   };
   const std::size_t models = results.models.size();
-  add("pareto-time", "What accuracy costs in time and memory: mean over the models",
+  add("pareto-time", "What accuracy costs in time and memory: geometric mean over the models",
       fmt::format("mean error of the points answered in the +-3 % shell, % of R_max; below {} drawn there",
                   kLeastError_percent),
       "ns a point", time.series(models, "%", "ns a point"));
-  add("pareto-normals", "What good normals cost in memory: mean over the models",
+  add("pareto-normals", "What good normals cost in memory: geometric mean over the models",
       "mean angle to the true normal of the points answered, degrees; below 0.1 drawn there", "KB resident",
       angle.series(models, "deg", "KB"));
-  add("budget", "8 to 128 KB an object: error near contact and frame, mean over the models",
+  add("budget", "8 to 128 KB an object: error near contact and frame, geometric mean over the models",
       "mean error of the points answered within 1 % of the surface, % of R_max",
       "microseconds a touching frame", budget.series(models, "%", "us a frame"));
 }
@@ -159,15 +161,23 @@ std::vector<Bar> bars_over_models(const std::vector<std::pair<std::string, doubl
   return bars;
 }
 
+constexpr const char* kSpan = "; line: from the least model to the greatest";
+
 void add_frames(const Results& results, std::vector<Picture>& pictures) {
-  for (const char* work : {"touching", "far", "grasp"}) {
+  for (const char* work : {"touching", "far", "grasp", "costume", "scene"}) {
     std::vector<std::pair<std::string, double>> values;
-    for (const FrameRow& row : results.frames)
-      if (row.work == work) values.emplace_back(row.peer, row.us.median);
+    std::set<std::string> models;
+    for (const FrameRow& row : results.frames) {
+      if (row.work != work) continue;
+      values.emplace_back(row.peer, row.us.median);
+      models.insert(row.model);
+    }
     if (values.empty()) continue;
-    const std::string title = fmt::format("A frame of the probe, {}: mean over the models", work);
+    const std::string title = models.size() > 1
+                                  ? fmt::format("A frame, {}: geometric mean over the models", work)
+                                  : fmt::format("A frame, {}: {}", work, *models.begin());
     pictures.push_back({fmt::format("frames-{}", work), title,
-                        bars_svg(title, "microseconds a frame; line: from the fastest model to the slowest",
+                        bars_svg(title, fmt::format("microseconds{}", models.size() > 1 ? kSpan : ""),
                                  bars_over_models(values))});
   }
 }
@@ -188,16 +198,16 @@ void add_shares_of_tree(const Results& results, std::vector<Picture>& pictures) 
       const double tree_us = us_of(kTreeReference);
       for (const char* peer : {"sqmap-layer1", "sqmap-layer2", "sqmap-layer3", "fcl-obb-first-contact",
                                "fcl-kdop18-all-contacts", "fcl-kdop18-first-contact",
-                               "bullet-gimpact-all-contacts", "fcl-obb-rebuilt-all-contacts", kReference})
+                               "bullet-gimpact-all-contacts", "fcl-obb-rebuilt-all-contacts",
+                               "grid-int16-128-simd", "grid-int16-128-simd-culled", "bricks-8bit-128-simd"})
         values.emplace_back(peer, 100 * us_of(peer) / tree_us);
     }
     const std::vector<Bar> bars = bars_over_models(values);
     if (bars.empty()) continue;
     const std::string title = fmt::format(
         "Fig. {} of the paper, {}: cost of a frame, OBB tree with all contacts = 100 %", figure, work);
-    pictures.push_back(
-        {fmt::format("fig11-{}", work), title,
-         bars_svg(title, "% of the OBB tree; line: from the least model to the greatest", bars)});
+    pictures.push_back({fmt::format("fig11-{}", work), title,
+                        bars_svg(title, std::string("% of the OBB tree") + kSpan, bars)});
   }
 }
 
@@ -214,8 +224,8 @@ void add_memory_by_density(const Results& results, std::vector<Picture>& picture
       const std::string family = row.family.starts_with("adf-float")
                                      ? "ADF, bound " + row.method.substr(row.method.rfind('-') + 1) + " %"
                                      : row.family;
-      series.add(family, {static_cast<double>(row.density), row.bytes / 1e3, row.bytes,
-                          fmt::format("{}: {:.4g} KB", row.method, row.bytes / 1e3)});
+      series.add(family, {static_cast<double>(row.density), row.bytes / kKilobyte, row.bytes,
+                          fmt::format("{}: {:.4g} KB", row.method, row.bytes / kKilobyte)});
     }
     if (series.series.empty()) continue;
     const std::string title = fmt::format("Fig. 12 of the paper, {}: memory and sampling density", model);
@@ -228,56 +238,59 @@ void add_memory_by_density(const Results& results, std::vector<Picture>& picture
 void add_rest(const Results& results, std::vector<Picture>& pictures) {
   std::vector<std::pair<std::string, double>> memory, jumps, small_jumps, effects;
   for (const MemoryRow& row : results.memory)
-    if (row.model != "all models")
-      memory.emplace_back(row.is_paper ? "paper: " + row.method : row.method, row.bytes / 1e3);
+    if (row.model != "all models" && !(row.is_paper && row.model == "Scene"))
+      memory.emplace_back(row.is_paper ? "paper: " + row.method : row.method, row.bytes / kKilobyte);
   for (const ForceRow& row : results.force)
     (row.peer.ends_with(kSmallStepsName) ? small_jumps : jumps)
         .emplace_back(row.peer, row.mean_change_percent);
   for (const EffectRow& row : results.effects) effects.emplace_back(row.variant, row.us.median);
   const auto add = [&](const char* name, const char* title, const char* axis, const auto& values) {
-    if (!values.empty()) pictures.push_back({name, title, bars_svg(title, axis, bars_over_models(values))});
+    if (!values.empty())
+      pictures.push_back({name, title, bars_svg(title, std::string(axis) + kSpan, bars_over_models(values))});
   };
-  add("memory", "Memory: mean over the models", "KB resident; line: from the least model to the greatest",
-      memory);
-  add("force", "Change of force from step to step of a slide: mean over the models", "% of the mean force",
-      jumps);
-  add("force-small-steps", "Change of force in steps of about 0.005 % of R_max: mean over the models",
+  add("memory", "Memory: geometric mean over the models", "KB resident", memory);
+  add("force", "Change of force from step to step of a slide: geometric mean over the models",
+      "% of the mean force", jumps);
+  add("force-small-steps",
+      "Change of force in steps of about 0.005 % of R_max: geometric mean over the models",
       "% of the mean force", small_jumps);
-  add("effects", "What a touching frame costs by what it asks for: mean over the models",
-      "microseconds a frame", effects);
+  add("effects", "What a touching frame costs by what it asks for: geometric mean over the models",
+      "microseconds", effects);
   SeriesByFamily bake;
   for (const BakeRow& row : results.bake)
     bake.add(row.model, {row.eq35_percent, row.seconds, row.bytes,
                          fmt::format("{}: {:.3g} %, {:.3g} s, {:.3g} KB, {} parts", row.model,
-                                     row.eq35_percent, row.seconds, row.bytes / 1e3, row.parts)});
+                                     row.eq35_percent, row.seconds, row.bytes / kKilobyte, row.parts)});
   if (!bake.series.empty())
     pictures.push_back({"bake", "What accuracy costs in baking",
                         scatter_svg("What accuracy costs in baking", "error of the maps (eq. 35), % of R_max",
                                     "seconds", bake.series)});
 }
 
+enum class Drawn { kLinear, kLogarithmic, kPanels };
 /// The axes of a figure that is drawn from curves.
 struct Figure {
   const char *figure, *title, *x_title, *y_title;
-  bool is_logarithmic;
+  Drawn drawn;
 };
 constexpr Figure kFigures[] = {
     {"13a", "Fig. 13a of the paper: the direction of the force along a slide", "way, % of R_max",
-     "angle between force and way, degrees", false},
+     "angle between force and way, degrees", Drawn::kPanels},
     {"13b", "Fig. 13b of the paper: how the force changes from step to step", "way, % of R_max",
-     "|F_i - F_i-1|, % of the mean force", false},
+     "|F_i - F_i-1|, % of the mean force", Drawn::kPanels},
     {"13b-small", "Fig. 13b of the paper in steps of about 0.005 % of R_max", "way, % of R_max",
-     "|F_i - F_i-1|, % of the mean force", false},
-    {"14a", "Fig. 14a of the paper: frames of a slide", "pose", "microseconds a frame", false},
-    {"14b", "Fig. 14b of the paper: many contacts", "points of the probe inside the object",
-     "microseconds a frame", false},
+     "|F_i - F_i-1|, % of the mean force", Drawn::kPanels},
+    {"14a", "Fig. 14a of the paper: frames of a slide", "pose", "microseconds a frame", Drawn::kLinear},
+    {"14b", "Fig. 14b of the paper: many contacts", "points of the probe inside the object, poses with any",
+     "microseconds a frame", Drawn::kLogarithmic},
     {"14c", "Fig. 14c of the paper: performance and error, layers 2 to 3",
-     "mean error of the points answered in the +-3 % shell, % of R_max", "points a microsecond", true},
+     "mean error of the points answered in the +-3 % shell, % of R_max", "points a microsecond",
+     Drawn::kLogarithmic},
     {"objects", "The same object in ever more faces", "faces of the object", "microseconds a touching frame",
-     true},
-    {"objects-build", "What preparing it costs", "faces of the object", "seconds", true},
+     Drawn::kLogarithmic},
+    {"objects-build", "What preparing it costs", "faces of the object", "seconds", Drawn::kLogarithmic},
     {"probes", "The same probe in ever more points", "points of the probe", "microseconds a touching frame",
-     true},
+     Drawn::kLogarithmic},
 };
 
 void add_curves(const Results& results, std::vector<Picture>& pictures) {
@@ -293,7 +306,10 @@ void add_curves(const Results& results, std::vector<Picture>& pictures) {
     const std::string title = fmt::format("{} ({})", figure.title, model);
     const std::string name = figure.figure[0] == '1' ? fmt::format("fig{}", figure.figure) : figure.figure;
     pictures.push_back(
-        {name, title, lines_svg(title, figure.x_title, figure.y_title, lines, figure.is_logarithmic)});
+        {name, title,
+         figure.drawn == Drawn::kPanels
+             ? panels_svg(title, figure.x_title, figure.y_title, lines)
+             : lines_svg(title, figure.x_title, figure.y_title, lines, figure.drawn == Drawn::kLogarithmic)});
   }
 }
 

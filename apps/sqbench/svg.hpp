@@ -28,13 +28,17 @@ struct Line {
 std::string lines_svg(const std::string& title, const std::string& x_title, const std::string& y_title,
                       const std::vector<Line>& lines, bool is_logarithmic);
 
-/// One bar from zero with its quartiles.
+/// The same over linear axes, each line in a panel of its own: for lines that would hide each other.
+std::string panels_svg(const std::string& title, const std::string& x_title, const std::string& y_title,
+                       const std::vector<Line>& lines);
+
+/// A value, and the least and the greatest of what it is the mean of.
 struct Bar {
   std::string name;
   double value{}, lower{}, upper{};
   bool is_ours{};
 };
-/// Bars over a logarithmic axis, one below the other.
+/// Dots on a line each, over a logarithmic axis: the length of a bar would mean nothing there.
 std::string bars_svg(const std::string& title, const std::string& x_title, const std::vector<Bar>& bars);
 
 struct Caption {
