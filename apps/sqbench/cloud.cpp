@@ -51,25 +51,49 @@ Cloud::Cloud(std::span<const Vec3d> input_m) : count(input_m.size()), source(inp
     z_m.push_back(p.z);
   }
   block_count = (count + kBlock - 1) / kBlock;
-  for (std::size_t block = 0; block < block_count; ++block) {
-    const std::size_t begin = block * kBlock, end = std::min(begin + kBlock, count);
-    Vec3d low = cast<double>(points_m[begin]), high = low;
-    for (std::size_t i = begin; i < end; ++i)
-      for (int axis = 0; axis < 3; ++axis) {
-        low[axis] = std::min<double>(low[axis], points_m[i][axis]);
-        high[axis] = std::max<double>(high[axis], points_m[i][axis]);
-      }
-    const Vec3d centre = 0.5 * (low + high);
-    double radius = 0;
-    for (std::size_t i = begin; i < end; ++i)
-      radius = std::max(radius, norm(cast<double>(points_m[i]) - centre));
-    block_x_m.push_back(static_cast<float>(centre.x));
-    block_y_m.push_back(static_cast<float>(centre.y));
-    block_z_m.push_back(static_cast<float>(centre.z));
-    block_radius_m.push_back(static_cast<float>(radius * 1.00001));  // rounding of the centre
+  for (auto* axis : {&block_x_m, &block_y_m, &block_z_m, &block_radius_m}) axis->resize(padded(block_count));
+  for (std::size_t block = 0; block < block_count; ++block) bound(block);
+}
+
+void Cloud::refit(std::span<const Vec3f> places_m) {
+  for (std::size_t i = 0; i < count; ++i) {
+    const Vec3f& p = places_m[source[i]];
+    points_m[i] = p;
+    x_m[i] = p.x;
+    y_m[i] = p.y;
+    z_m[i] = p.z;
   }
-  for (auto* axis : {&block_x_m, &block_y_m, &block_z_m, &block_radius_m})
-    axis->resize(padded(block_count), axis->empty() ? 0.0F : axis->back());
+  for (auto* axis : {&x_m, &y_m, &z_m})  // a whole block is read, and bounded, where the last is not full
+    std::fill(axis->begin() + static_cast<std::ptrdiff_t>(count), axis->end(),
+              count == 0 ? 0.0F : (*axis)[count - 1]);
+  for (std::size_t block = 0; block < block_count; ++block) bound(block);
+}
+
+void Cloud::bound(std::size_t block) {
+  constexpr std::size_t kLanes = 8;  // one after the other they would wait for each other
+  const std::vector<float>* const from[] = {&x_m, &y_m, &z_m};
+  std::vector<float>* const to[] = {&block_x_m, &block_y_m, &block_z_m};
+  const std::size_t begin = block * kBlock;
+  float square_m2[kBlock] = {};
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const float* at = from[axis]->data() + begin;
+    float low[kLanes], high[kLanes];
+    for (std::size_t k = 0; k < kLanes; ++k) low[k] = high[k] = at[k];
+    for (std::size_t i = kLanes; i < kBlock; i += kLanes)
+      for (std::size_t k = 0; k < kLanes; ++k) {
+        low[k] = at[i + k] < low[k] ? at[i + k] : low[k];
+        high[k] = at[i + k] > high[k] ? at[i + k] : high[k];
+      }
+    const float centre_m =
+        0.5F * (*std::min_element(low, low + kLanes) + *std::max_element(high, high + kLanes));
+    (*to[axis])[block] = centre_m;
+    for (std::size_t i = 0; i < kBlock; ++i) square_m2[i] += (at[i] - centre_m) * (at[i] - centre_m);
+  }
+  float most_m2[kLanes] = {};
+  for (std::size_t i = 0; i < kBlock; i += kLanes)
+    for (std::size_t k = 0; k < kLanes; ++k)
+      most_m2[k] = square_m2[i + k] > most_m2[k] ? square_m2[i + k] : most_m2[k];
+  block_radius_m[block] = std::sqrt(*std::max_element(most_m2, most_m2 + kLanes)) * 1.00001F;  // rounding
 }
 
 Hits::Hits(std::size_t points) : point(padded(points)) {

@@ -17,6 +17,9 @@ inline constexpr std::size_t kPadding = 64;  ///< floats that may be read or wri
 /// one array a coordinate. Arrays are padded to whole blocks with copies of the last point.
 struct Cloud {
   explicit Cloud(std::span<const Vec3d> points_m);
+  /// Moves the points, given in the order of the constructor's, and bounds the blocks anew; allocates
+  /// nothing.
+  void refit(std::span<const Vec3f> places_m);
 
   std::size_t count{};
   std::vector<float> x_m, y_m, z_m;   ///< own frame of the cloud
@@ -24,6 +27,9 @@ struct Cloud {
   std::vector<std::uint32_t> source;  ///< index of each point in the input
   std::vector<float> block_x_m, block_y_m, block_z_m, block_radius_m;  ///< bounding spheres, padded
   std::size_t block_count{};
+
+ private:
+  void bound(std::size_t block);
 };
 
 /// Rigid: p_object = rotation * p_cloud + translation.

@@ -105,7 +105,8 @@ void run_press(const SuiteInput& input, const Model& model, const Probe& probe, 
     press.push_back(placement);
   }
   const auto layer_2 = make_sqmap(model, 2, 0), layer_3 = make_sqmap(model, 3, 0),
-             grid = make_grid(model, GridCode::kInt16Simd, 128), paper = make_paper(model, 100, 200, 0);
+             grid = make_grid(model, GridCode::kInt16SimdCulled, 128), bricks = make_bricks(model, 128),
+             paper = make_paper(model, 100, 200, 0);
   const auto tree = make_fcl(model, probe.mesh, FclTree::kObb, false);
   Hits hits(probe.cloud.count);
   const auto asks = [&](const char* name, const Peer& peer) -> Contestant {
@@ -118,6 +119,7 @@ void run_press(const SuiteInput& input, const Model& model, const Probe& probe, 
              {asks("sqmap-layer2", *layer_2),
               asks("sqmap-layer3", *layer_3),
               asks(kReference, *grid),
+              asks(kBricks, *bricks),
               asks("paper-100x200-layer2", *paper),
               {kTreeReference, [&](std::size_t pose) { return tree->contacts(press[pose]); }}},
              x, input.is_smoke ? 3 : 9, results);

@@ -112,7 +112,7 @@ void run_costume(const SuiteInput& input, const Model& model, Results& results) 
   std::vector<runtime::Contact> contacts(body.point_count());
   Cloud cloud(sheet.mesh.vertices_m);
   Hits hits(cloud.count);
-  const auto grid = make_grid(model, GridCode::kInt16Simd, 128);
+  const auto grid = make_grid(model, GridCode::kInt16SimdCulled, 128), bricks = make_bricks(model, 128);
   const auto refitted = make_fcl_sheet(model, sheet.mesh, TreeUpdate::kRefit),
              rebuilt = make_fcl_sheet(model, sheet.mesh, TreeUpdate::kRebuild);
 
@@ -125,16 +125,15 @@ void run_costume(const SuiteInput& input, const Model& model, Results& results) 
                              query.within_m = static_cast<float>(kBand * model.r_max_m());
                              return object.contacts(body, {}, contacts, query);
                            }});
-  contestants.push_back({kReference, [&](std::size_t f) {
-                           for (std::size_t i = 0; i < cloud.count; ++i) {
-                             const Vec3f& p_m = places_m[f][cloud.source[i]];
-                             cloud.x_m[i] = p_m.x;
-                             cloud.y_m[i] = p_m.y;
-                             cloud.z_m[i] = p_m.z;
-                           }
-                           grid->answer(cloud, {}, hits);
-                           return hits.count;
-                         }});
+  const auto add_field = [&](const char* name, const Peer& peer) {
+    contestants.push_back({name, [&](std::size_t f) {
+                             cloud.refit(places_m[f]);
+                             peer.answer(cloud, {}, hits);
+                             return hits.count;
+                           }});
+  };
+  add_field(kReference, *grid);
+  add_field(kBricks, *bricks);
   contestants.push_back(
       {kTreeReference, [&](std::size_t f) { return refitted->contacts(sheet.places_m[f]); }});
   contestants.push_back(
@@ -143,7 +142,7 @@ void run_costume(const SuiteInput& input, const Model& model, Results& results) 
   bake::Mesh here = sheet.mesh;
   here.vertices_m = sheet.places_m[frames / 2];
   const auto expected = static_cast<double>(crossing_pairs(model, here, {}).size());
-  for (const Contestant& contestant : {contestants[4], contestants[5]}) {
+  for (const Contestant& contestant : {contestants[5], contestants[6]}) {
     const auto found = static_cast<double>(contestant.run(frames / 2));
     const double off = 100 * std::abs(found - expected) / std::max(expected, 1.0);
     results.checks.push_back({model.name, contestant.name,

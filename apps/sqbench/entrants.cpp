@@ -80,8 +80,8 @@ const Entrant kCgal{"cgal-closest", "cgal-closest", make_cgal, 0};
 std::vector<Entrant> frame_entrants(const Model& model, bool smoke) {
   std::vector<Entrant> entrants{sqmap_entrant(1, 0), sqmap_entrant(2, 0), sqmap_entrant(3, 0)};
   for (const unsigned resolution : {64U, 128U, 256U})
-    if (!smoke || resolution < 256) entrants.push_back(grid_entrant(GridCode::kInt16Simd, resolution));
-  entrants.push_back(grid_entrant(GridCode::kInt16SimdCulled, 128));
+    for (const GridCode code : {GridCode::kInt16Simd, GridCode::kInt16SimdCulled})
+      if (!smoke || resolution < 256) entrants.push_back(grid_entrant(code, resolution));
   entrants.push_back(grid_entrant(GridCode::kFloatSimd, 128));
   entrants.push_back(grid_entrant(GridCode::kFloatScalar, 128));
   for (const unsigned resolution : {64U, 128U}) entrants.push_back(bricks_entrant(resolution));

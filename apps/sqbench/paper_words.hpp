@@ -11,6 +11,9 @@ namespace sqmap::bench {
 /// Ends the names of those that slide in steps of about 0.005 % of R_max.
 inline constexpr const char* kSmallStepsName = ", small steps";
 
+/// The grid whose forces stand beside ours; how fast it answers plays no part there.
+inline constexpr const char* kGridOfSlides = "grid-int16-128-simd";
+
 /// What stands beside the paper's Table 1 and Fig. 11, and how its query as printed fares; sentences, those
 /// that the suites run have numbers for.
 std::vector<std::string> paper_words(const Results& results);

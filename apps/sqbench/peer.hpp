@@ -83,8 +83,10 @@ std::vector<FacePair> crossing_pairs(const Model& model, const bake::Mesh& probe
 std::size_t count_strays(const std::vector<FacePair>& pairs, const Model& model, const bake::Mesh& probe,
                          const Placement& object_from_probe);
 
-/// The method that ratios refer to: a plain and strong rival.
-inline constexpr const char* kReference = "grid-int16-128-simd";
+/// The method that ratios refer to: a plain and strong rival, at its best.
+inline constexpr const char* kReference = "grid-int16-128-simd-culled";
+/// The fastest rival of most frames.
+inline constexpr const char* kBricks = "bricks-8bit-128-simd";
 /// The method that the paper's Fig. 11 refers to.
 inline constexpr const char* kTreeReference = "fcl-obb-all-contacts";
 

@@ -41,7 +41,7 @@ struct Standing {
   runtime::Object object;
   Probe probe;
   runtime::PointBody body;
-  std::unique_ptr<Peer> grid;
+  std::unique_ptr<Peer> grid, bricks;
   std::unique_ptr<ContactPeer> tree;
   std::vector<Placement> object_from_probe;  ///< in every frame of the scene
 };
@@ -71,7 +71,8 @@ std::vector<Standing> stand(const SuiteInput& input, std::size_t count, std::siz
                      value_of(runtime::Object::build(model.asset)),
                      std::move(probe),
                      std::move(body),
-                     make_grid(model, GridCode::kInt16Simd, 128),
+                     make_grid(model, GridCode::kInt16SimdCulled, 128),
+                     make_bricks(model, 128),
                      std::move(tree),
                      {}});
   }
@@ -176,14 +177,17 @@ void run_scene(const SuiteInput& input, Results& results) {
     return all(
         [&, chosen](const Standing& one, std::size_t item) { return ask(one, chosen, item, contacts); });
   };
+  const auto field = [&](std::unique_ptr<Peer> Standing::*peer) {
+    return all([&, peer](const Standing& one, std::size_t item) {
+      (one.*peer)->answer(one.probe.cloud, one.object_from_probe[item], hits);
+      return hits.count;
+    });
+  };
   constexpr std::size_t kGrid = 2;
   const std::vector<Contestant> contestants{{"sqmap-layer2", layer(runtime::Layer::kTwo)},
                                             {"sqmap-layer3", layer(runtime::Layer::kThree)},
-                                            {kReference, all([&](const Standing& one, std::size_t item) {
-                                               one.grid->answer(one.probe.cloud, one.object_from_probe[item],
-                                                                hits);
-                                               return hits.count;
-                                             })},
+                                            {kReference, field(&Standing::grid)},
+                                            {kBricks, field(&Standing::bricks)},
                                             {kTreeReference, all([](const Standing& one, std::size_t item) {
                                                return one.tree->contacts(one.object_from_probe[item]);
                                              })}};

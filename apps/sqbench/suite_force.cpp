@@ -245,7 +245,7 @@ void run_small_steps(const SuiteInput& input, const Model& model, bool is_drawn,
   add("mesh-normals", felt_by_triangles(model, path, false));
   add("mesh-shaded", felt_by_triangles(model, path, true));
   add("sqmap-layer3", felt_by(*make_sqmap(model, 3, 0), path));
-  add(kReference, felt_by(*make_grid(model, GridCode::kInt16Simd, 128), path));
+  add(kGridOfSlides, felt_by(*make_grid(model, GridCode::kInt16Simd, 128), path));
   add("sqmap-layer3-smoothed", felt_by_effect(model, path, smoothing_of(model)));
   add("sqmap-layer3-tracked", felt_by_effect(model, path, tracking_of(model)));
 }
@@ -267,7 +267,7 @@ void run_force(const SuiteInput& input, Results& results) {
     add("mesh-shaded", felt_by_triangles(model, path, true), is_first);
     for (const Entrant& entrant : frame_entrants(model, input.is_smoke))
       add(entrant.id, felt_by(*build_peer(entrant, model, results).peer, path),
-          is_first && (entrant.id == "sqmap-layer3" || entrant.id == kReference));
+          is_first && (entrant.id == "sqmap-layer3" || entrant.id == kGridOfSlides));
     add("sqmap-layer3-smoothed", felt_by_effect(model, path, smoothing_of(model)), is_first);
     add("sqmap-layer3-tracked", felt_by_effect(model, path, tracking_of(model)), is_first);
     run_small_steps(input, model, is_first, results);

@@ -99,7 +99,8 @@ void run_objects(const SuiteInput& input, Results& results) {
     };
     add("sqmap-layer2", [&] { return make_sqmap(model, 2, 0); });
     add("sqmap-layer3", [&] { return make_sqmap(model, 3, 0); });
-    add(kReference, [&] { return make_grid(model, GridCode::kInt16Simd, 128); });
+    add(kReference, [&] { return make_grid(model, GridCode::kInt16SimdCulled, 128); });
+    add(kBricks, [&] { return make_bricks(model, 128); });
     add("embree-closest", [&] { return make_embree(model); });
     start = std::chrono::steady_clock::now();
     const auto tree = make_fcl(model, probe.mesh, FclTree::kObb, false);
@@ -152,8 +153,8 @@ void run_probes(const SuiteInput& input, const Model& model, Results& results) {
   std::vector<std::pair<std::string, std::unique_ptr<Peer>>> peers;
   peers.emplace_back("sqmap-layer2", make_sqmap(model, 2, 0));
   peers.emplace_back("sqmap-layer3", make_sqmap(model, 3, 0));
-  peers.emplace_back(kReference, make_grid(model, GridCode::kInt16Simd, 128));
-  peers.emplace_back("bricks-8bit-128-simd", make_bricks(model, 128));
+  peers.emplace_back(kReference, make_grid(model, GridCode::kInt16SimdCulled, 128));
+  peers.emplace_back(kBricks, make_bricks(model, 128));
   peers.emplace_back("embree-closest", make_embree(model));
   for (const std::size_t count : {100U, 1000U, 10000U, 100000U, 1000000U}) {
     if (input.is_smoke && count > 1000) break;

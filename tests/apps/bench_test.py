@@ -155,14 +155,16 @@ class Smoke(SmokeRun):
 
     def test_every_method_of_the_scene_finds_what_the_exact_meshes_of_all_objects_say(self):
         scene = {row["peer"]: row for row in self.rows("frames", work="scene")}
-        self.assertEqual(scene.keys(), {"sqmap-layer2", "sqmap-layer3", "grid-int16-128-simd", "fcl-obb-all-contacts"})
+        self.assertEqual(scene.keys(), {"sqmap-layer2", "sqmap-layer3", "grid-int16-128-simd-culled", "bricks-8bit-128-simd",
+                                        "fcl-obb-all-contacts"})
         work = self.rows("works", work="scene")[0]
         self.assertTrue(work["model"].startswith("2 objects"))
         self.assertGreater(work["contacts_mean"], 0)
         for layer in (2, 3):
             self.assertGreaterEqual(scene[f"sqmap-layer{layer}"]["answers_mean"], 0.95 * work["contacts_mean"])
-        self.assertAlmostEqual(scene["grid-int16-128-simd"]["answers_mean"], work["near_mean"],
-                               delta=1 + 0.02 * work["near_mean"])
+        for field in ("grid-int16-128-simd-culled", "bricks-8bit-128-simd"):
+            self.assertAlmostEqual(scene[field]["answers_mean"], work["near_mean"], delta=1 + 0.02 * work["near_mean"],
+                                   msg=field)
         self.assertGreater(scene["fcl-obb-all-contacts"]["answers_mean"], 0)
         claims = [check["claim"] for check in self.rows("checks", model=work["model"])]
         missed = "points inside an object of the scene that are missed, percent"
@@ -175,7 +177,8 @@ class Smoke(SmokeRun):
             self.assertLessEqual(work["deepest_percent"], 0.5 + 1e-3)
             frame = {row["peer"]: row["answers_mean"] for row in self.rows("frames", model=model, work="costume")}
             self.assertEqual(frame["fcl-obb-all-contacts"], frame["fcl-obb-rebuilt-all-contacts"])
-            self.assertAlmostEqual(frame["grid-int16-128-simd"], work["near_mean"], delta=1 + 0.03 * work["near_mean"])
+            for field in ("grid-int16-128-simd-culled", "bricks-8bit-128-simd"):
+                self.assertAlmostEqual(frame[field], work["near_mean"], delta=1 + 0.03 * work["near_mean"], msg=field)
             self.assertGreaterEqual(frame["sqmap-layer3"], 0.95 * work["contacts_mean"])
 
     def test_every_effect_is_timed_beside_the_reaction(self):
@@ -297,7 +300,7 @@ class Smoke(SmokeRun):
     def test_reference_has_ratio_one_and_spreads_are_ordered(self):
         for row in self.results["frames"]:
             self.assertTrue(0 < row["us"]["lower"] <= row["us"]["median"] <= row["us"]["upper"])
-            if row["peer"] == "grid-int16-128-simd":
+            if row["peer"] == "grid-int16-128-simd-culled":
                 self.assertEqual(row["ratio"], {"median": 1, "lower": 1, "upper": 1})
 
     def test_force_over_facets_turns_less_when_shaded_and_least_on_the_map(self):
@@ -316,7 +319,7 @@ class Smoke(SmokeRun):
         for row in self.results["budgets"]:
             self.assertLessEqual(row["bytes"], row["budget_bytes"], row)
             self.assertGreater(row["answered_percent"], 50, row)
-        grid = self.rows("budgets", model="ball", family="grid-int16-simd")[0]
+        grid = self.rows("budgets", model="ball", family="grid-int16-simd-culled")[0]
         nodes = int(grid["peer"].split("-")[2])  # the ball's box is a cube
         self.assertLess(2 * nodes ** 3, grid["budget_bytes"])
         self.assertGreater(2 * (nodes + 1) ** 3 + 200, grid["budget_bytes"])
