@@ -51,12 +51,27 @@ std::vector<std::string> budget_words(const Results& results) {
     budgets.insert(row.budget_bytes);
     models.insert(row.model);
   }
+  std::vector<std::string> kept, missed;
+  for (const double budget : budgets) {
+    const Losses losses = losses_of(results, budget, "sqmap-layer3", &BudgetRow::mean_error_percent);
+    const bool is_kept = losses.models == models.size() && losses.lost() == 0;
+    (is_kept ? kept : missed).push_back(fmt::format("{:g}", budget / kKilobyte));
+  }
+  if (!budgets.empty())
+    words.push_back(fmt::format(
+        "The target: for every budget of 8 to 128 KB an object, no rival has both a smaller error near "
+        "contact "
+        "(within 1 % of the surface) and a shorter frame than layer 3, on any model. {}{}",
+        missed.empty() ? "It holds at all that were run." : "It does not hold at " + joined(missed) + " KB",
+        missed.empty() ? ""
+        : kept.empty() ? "."
+                       : ", and holds at " + joined(kept) + " KB."));
   for (const double budget : budgets) {
     const Losses closest = losses_of(results, budget, "sqmap-layer3", &BudgetRow::mean_error_percent);
     const Losses faster = losses_of(results, budget, "sqmap-layer2", &BudgetRow::mean_error_percent);
     const Losses normals = losses_of(results, budget, "sqmap-layer3", &BudgetRow::normal_mean_deg);
     const Losses depth = losses_of(results, budget, "sqmap-layer3", &BudgetRow::depth_error_percent);
-    std::string text = fmt::format("{:g} KB an object: ", budget / 1024);
+    std::string text = fmt::format("{:g} KB an object: ", budget / kKilobyte);
     if (closest.models < models.size())
       text += fmt::format("sqmap fits for {} of {} models only; ", closest.models, models.size());
     if (closest.models == 0) {

@@ -390,7 +390,9 @@ class Smoke(SmokeRun):
                       "Around the surface (+-3 % shell)", "are in none of its means", "of the points it answers",
                       "Table 1, all models", "Fig. 14c: the paper prints errors of 0.4 to 0.5 %", "32 KB an object: "):
             self.assertIn(words, page)
-        self.assertRegex(page, r"(wins against|loses to) that grid")
+        for work in ("touching", "far", "grasp", "costume", "scene"):
+            self.assertRegex(page, rf"Frames, {work}, against the fastest rival of each model \([\w-]+ on \d.*?\): layer 2 "
+                                   r"takes [\d.]+ times as long and wins on \d of [12]; layer 3 takes [\d.]+ times")
 
     @unittest.skipUnless(CHROMIUM, "no Chromium here")
     def test_chromium_shows_the_page_without_an_error_and_every_figure_with_something_on_it(self):
@@ -470,6 +472,11 @@ class Draw(SmokeRun):
         files = {path.name: path.read_text(encoding="utf-8") for path in out.iterdir()} if out.exists() else {}
         return done, files
 
+    def page_of(self, results):
+        done, files = self.drawn(results)
+        self.assert_exit(done, 0)
+        return files["index.html"]
+
     def test_files_are_those_of_the_run(self):
         done, files = self.drawn(self.files["results.json"], "fig04.svg", "fig10.svg")
         self.assert_exit(done, 0)
@@ -490,6 +497,43 @@ class Draw(SmokeRun):
             self.assert_exit(refused, 4)
             self.assertIn(words, refused.stderr)
             self.assertEqual(files, {})
+
+    def test_words_on_frames_follow_the_times(self):
+        for factor, layer_3 in ((1e-6, "wins on 2 of 2"), (1e6, "wins on 0 of 2")):
+            results = json.loads(self.files["results.json"])
+            for row in results["frames"]:
+                if row["peer"] == "sqmap-layer3":
+                    row["us"]["median"] *= factor
+            words = re.search(r"Frames, grasp, .*?\(geometric mean\)", self.page_of(results)).group()
+            self.assertIn(layer_3, words.split("; layer 3")[1])
+
+    def test_fastest_rival_is_named_whatever_it_is(self):
+        results = json.loads(self.files["results.json"])
+        for row in results["frames"]:
+            if row["peer"] == "cgal-closest" and row["model"] == "ball":
+                row["us"]["median"] = 1e-6
+        self.assertRegex(self.page_of(results), r"Frames, far, against the fastest rival of each model \(.*?cgal-closest on 1")
+
+    def test_target_is_told_to_hold_or_not_by_the_budgets(self):
+        for error, frame, words in ((1e-9, 1, "It holds at all that were run."), (1, 1e-9, "It holds at all that were run."),
+                                    (1e9, 1e9, "It does not hold at 32 KB.")):
+            results = json.loads(self.files["results.json"])
+            for row in results["budgets"]:
+                if row["family"] == "sqmap-layer3":
+                    row["mean_error_percent"] *= error
+                    row["us"]["median"] *= frame
+            self.assertIn(words, self.page_of(results))
+        results["budgets"] = [row for row in results["budgets"] if row["model"] == "ball" or
+                              not row["family"].startswith("sqmap")]
+        page = self.page_of(results)
+        self.assertIn("It does not hold at 32 KB.", page)
+        self.assertIn("sqmap fits for 1 of 2 models only", page)
+
+    def test_trees_that_took_no_part_are_not_beaten(self):
+        page = self.page_of(self.results)
+        costume = re.search(r"Fig. 11b, costume: .*?</p>", page).group()
+        self.assertNotIn("kdop", costume)
+        self.assertIn("fcl-obb-rebuilt-all-contacts", costume)
 
 
 class Table(SmokeRun):
