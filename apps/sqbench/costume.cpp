@@ -134,6 +134,17 @@ void run_costume(const SuiteInput& input, const Model& model, Results& results) 
   };
   add_field(kReference, *grid);
   add_field(kBricks, *bricks);
+  const auto plain_grid = make_grid(model, GridCode::kInt16Simd, 128);
+  contestants.push_back({"grid-int16-128-simd", [&](std::size_t f) {  // needs no bounds of blocks
+                           for (std::size_t i = 0; i < cloud.count; ++i) {
+                             const Vec3f& p_m = places_m[f][cloud.source[i]];
+                             cloud.x_m[i] = p_m.x;
+                             cloud.y_m[i] = p_m.y;
+                             cloud.z_m[i] = p_m.z;
+                           }
+                           plain_grid->answer(cloud, {}, hits);
+                           return hits.count;
+                         }});
   contestants.push_back(
       {kTreeReference, [&](std::size_t f) { return refitted->contacts(sheet.places_m[f]); }});
   contestants.push_back(
@@ -142,7 +153,7 @@ void run_costume(const SuiteInput& input, const Model& model, Results& results) 
   bake::Mesh here = sheet.mesh;
   here.vertices_m = sheet.places_m[frames / 2];
   const auto expected = static_cast<double>(crossing_pairs(model, here, {}).size());
-  for (const Contestant& contestant : {contestants[5], contestants[6]}) {
+  for (const Contestant& contestant : {contestants[6], contestants[7]}) {
     const auto found = static_cast<double>(contestant.run(frames / 2));
     const double off = 100 * std::abs(found - expected) / std::max(expected, 1.0);
     results.checks.push_back({model.name, contestant.name,

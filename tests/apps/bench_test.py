@@ -177,7 +177,7 @@ class Smoke(SmokeRun):
             self.assertLessEqual(work["deepest_percent"], 0.5 + 1e-3)
             frame = {row["peer"]: row["answers_mean"] for row in self.rows("frames", model=model, work="costume")}
             self.assertEqual(frame["fcl-obb-all-contacts"], frame["fcl-obb-rebuilt-all-contacts"])
-            for field in ("grid-int16-128-simd-culled", "bricks-8bit-128-simd"):
+            for field in ("grid-int16-128-simd", "grid-int16-128-simd-culled", "bricks-8bit-128-simd"):
                 self.assertAlmostEqual(frame[field], work["near_mean"], delta=1 + 0.03 * work["near_mean"], msg=field)
             self.assertGreaterEqual(frame["sqmap-layer3"], 0.95 * work["contacts_mean"])
 
