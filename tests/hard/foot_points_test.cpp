@@ -181,5 +181,53 @@ TYPED_TEST(HardFeet, AreTheNearestButForTheSharesStated) {
   }
 }
 
+// By symmetry to the last bit, zeros of either sign included; by scale but for the rounding of arc lengths in
+// the tables. In float the fourth powers of a cell's lengths underflow where micrometres are given in metres;
+// the runtime keeps lengths in units near the object's size. No formula of the surface in it.
+TYPED_TEST(HardFeet, FollowMirrorsAndScale) {
+  using T = TypeParam;
+  constexpr double kFactor = sizeof(T) == 4 ? 0x1p8 : 0x1p20;
+  std::mt19937_64 rng(77);
+  std::uniform_real_distribution<double> unit(0, 1);
+  double worst = 0, worst_scaled = 0;
+  for (const double e1 : test::kExponents)
+    for (const double e2 : test::kExponents)
+      for (const Vec3d& axes : test::kHardAxes) {
+        const Superquadric shape{axes, e1, e2};
+        const ShapeTable<T> table(shape, 65, 128), small({(1 / kFactor) * axes, e1, e2}, 65, 128),
+            large({kFactor * axes, e1, e2}, 65, 128);
+        SCOPED_TRACE(test::name_of(shape));
+        for (int i = 0; i < 8; ++i) {
+          Vec3d d{axes.x * unit(rng), axes.y * unit(rng), axes.z * unit(rng)};
+          if (i > 4) d[i % 3] = 0;
+          const Vec3<T> m = cast<T>((0.99 * std::cbrt(unit(rng)) / inside_outside_radial(shape, d)) * d);
+          const Foot<T> foot = table.foot(m);
+          const Vec3<T> place = table.sample(foot.row, foot.col).point_m;
+          for (int signs = 0; signs < 8; ++signs) {
+            const Vec3<T> sign{signs & 1 ? T(-1) : T(1), signs & 2 ? T(-1) : T(1), signs & 4 ? T(-1) : T(1)};
+            const Foot<T> mirrored = table.foot({sign.x * m.x, sign.y * m.y, sign.z * m.z});
+            ASSERT_EQ(mirrored.depth_m, foot.depth_m);
+            ASSERT_EQ(mirrored.cell_m, foot.cell_m);
+            const Vec3<T> there = table.sample(mirrored.row, mirrored.col).point_m;
+            // On a plane of symmetry either of two feet is right.
+            for (int axis = 0; axis < 3; ++axis)
+              worst = std::max(worst,
+                               std::abs(static_cast<double>(std::abs(there[axis]) - std::abs(place[axis]))));
+            for (int axis = 0; axis < 3; ++axis)
+              ASSERT_TRUE(m[axis] == 0 || sign[axis] * there[axis] >= 0) << axis;
+          }
+          for (const auto& [other, factor] : {std::pair{&small, T(1 / kFactor)}, {&large, T(kFactor)}}) {
+            const T depth_m = other->foot(factor * m).depth_m / factor;
+            worst_scaled = std::max(worst_scaled, static_cast<double>(std::abs(depth_m - foot.depth_m)));
+          }
+        }
+      }
+  this->RecordProperty("worst_epsilons", std::to_string(worst / std::numeric_limits<T>::epsilon()));
+  this->RecordProperty("worst_epsilons_scaled",
+                       std::to_string(worst_scaled / std::numeric_limits<T>::epsilon()));
+  EXPECT_LT(worst, 32 * std::numeric_limits<T>::epsilon());
+  EXPECT_LT(worst_scaled, 32 * std::numeric_limits<T>::epsilon());
+}
+
 }  // namespace
 }  // namespace sqmap
