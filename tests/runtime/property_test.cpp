@@ -16,6 +16,7 @@
 
 #include "support/analytic_asset.hpp"
 #include "support/branches.hpp"
+#include "support/targets.hpp"
 
 namespace sqmap::runtime {
 namespace {
@@ -81,6 +82,7 @@ TEST(InstanceProperty, AnswersTurnMoveScaleAndMirrorWithTheObject) {
     const QueryOptions options{Layer::kThree};
     const Answer world = instance.query(instance.to_world(p), options),
                  object = ball().object.query(p, options);
+    RC_ASSERT(test::every_target_agrees(instance, std::vector<Vec3f>{instance.to_world(p)}, options));
     RC_ASSERT((world.part == kNowhere) == (beta > 1));
     RC_ASSERT((object.part == kNowhere) == (beta > 1));
     RC_ASSERT(std::isnan(world.signed_distance_m) == (beta > 1));

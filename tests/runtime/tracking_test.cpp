@@ -9,6 +9,7 @@
 #include "sqmap/runtime/effects/force_model.hpp"
 #include "sqmap/runtime/effects/reaction.hpp"
 
+#include "support/mixed_asset.hpp"
 #include "touch_shapes.hpp"
 
 namespace sqmap::runtime {
@@ -21,6 +22,12 @@ const Object& box() {
 const Object& two_balls() {
   static const Result<Object> object =
       Object::build(test::two_balls({{{-0.5, 0, 0}, 0.8}, {{0.5, 0, 0}, 0.8}}, 65, 128));
+  return object.value();
+}
+
+/// Turned parts of all exponents, misses, further sheets and vertex samples at random places.
+const Object& mixed() {
+  static const Result<Object> object = Object::build(test::mixed_asset());
   return object.value();
 }
 
@@ -96,8 +103,8 @@ TEST(Tracking, KeepsPushingWhereAChartBesideASeamKnowsNoDepth) {
 TEST(Tracking, ForceNeverChangesFasterThanStated) {
   std::mt19937_64 rng(31);
   std::normal_distribution<double> normal;
-  for (const Object* object : {&box(), &two_balls()}) {
-    int jumps_without = 0;
+  for (const Object* object : {&box(), &two_balls(), &mixed()}) {
+    int jumps_without = 0, ends = 0;
     for (int walk = 0; walk < 20; ++walk) {
       std::vector<Vec3d> path{{0.1, 0.05, 0.1}};
       Vec3d v;
@@ -111,13 +118,23 @@ TEST(Tracking, ForceNeverChangesFasterThanStated) {
       const Tracking tracking;
       const auto plain = forces(*object, path), tracked = forces(*object, path, tracking);
       for (std::size_t i = 1; i < path.size(); ++i) {
-        if (norm(tracked[i - 1]) == 0) continue;
+        if (norm(tracked[i - 1]) == 0) continue;  // the contact's first frame
+        if (norm(tracked[i]) == 0) {              // its last: the promise is for as long as a contact lasts
+          ++ends;
+          continue;
+        }
         const double most = 3 * norm(path[i] - path[i - 1]) + tracking.catch_up_m + 1e-6;
         ASSERT_LE(norm(tracked[i] - tracked[i - 1]), most) << walk << ' ' << i;
         jumps_without += norm(plain[i] - plain[i - 1]) > most;
       }
     }
     EXPECT_GT(jumps_without, 10) << "the walks no longer meet a jump";
+    // The mixed asset's coarse maps end contacts within its balls; measured 106 of 30,000 frames.
+    EXPECT_LE(ends, object == &mixed() ? 200 : 0);
+    if (object == &mixed()) {
+      RecordProperty("jumps_without", jumps_without);
+      RecordProperty("ends", ends);
+    }
   }
 }
 
