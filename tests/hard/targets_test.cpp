@@ -3,8 +3,10 @@
 #include "support/targets.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <fstream>
 #include <iterator>
+#include <span>
 #include <sstream>
 #include <string>
 #include <vector>
@@ -49,6 +51,33 @@ TEST(Targets, AreThoseOfTheProcessor) {
   EXPECT_EQ(asked, expected);
   EXPECT_EQ(count, static_cast<int>(expected.size()));
   EXPECT_EQ(simd_target(), expected.back()) << "the widest is in use";
+}
+
+/// Answers 1 m everywhere, but for one instruction set the distance of one point in a batch.
+struct Liar {
+  SimdTarget target;
+  float distance_m;
+  Answer query(const Vec3f& /*p*/, const QueryOptions& /*options*/) const {
+    Answer answer;
+    answer.signed_distance_m = 1;
+    return answer;
+  }
+  void query(std::span<const Vec3f> points, const Answers& answers, const QueryOptions& /*options*/) const {
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      answers.signed_distance_m[i] = 1;
+      answers.part[i] = kNowhere;
+    }
+    if (simd_target() == target) answers.signed_distance_m.back() = distance_m;
+  }
+};
+
+// The widest instruction set is the one that other tests use anyway; the first is the one they would miss.
+TEST(Targets, DoNotAgreeWhereOneBitOfOneAnswerIsOther) {
+  const std::vector<Vec3f> points(20);
+  EXPECT_TRUE(test::every_target_agrees(Liar{SimdTarget::kBaseline, 1}, points, {}));
+  for (const SimdTarget target : {SimdTarget::kBaseline, simd_target()})
+    for (const float other : {std::nextafter(1.0F, 2.0F), std::nanf("")})
+      EXPECT_FALSE(test::every_target_agrees(Liar{target, other}, points, {}));
 }
 
 }  // namespace
