@@ -11,6 +11,7 @@
 #include <gtest/gtest.h>
 
 #include "support/analytic_asset.hpp"
+#include "support/targets.hpp"
 
 namespace sqmap::runtime {
 namespace {
@@ -178,7 +179,10 @@ TEST(Object, SecondSheetBehindTheFirstIsOutside) {
   std::mt19937_64 rng(9);
   for (int i = 0; i < 200; ++i) {
     const Vec3d n = random_direction(rng);
+    std::vector<Vec3f> points;
+    for (const double r : {0.55, 0.62, 0.7, 0.85}) points.push_back(cast<float>(r * n));
     for (const Layer layer : {Layer::kTwo, Layer::kThree}) {
+      EXPECT_TRUE(test::every_target_agrees(object, points, {layer}));
       const auto ask = [&](double r) { return object.query(cast<float>(r * n), {layer}); };
       EXPECT_FALSE(ask(0.85).inside);
       EXPECT_TRUE(ask(0.7).inside);
@@ -213,16 +217,19 @@ TEST(Object, CrossingASeamKeepsTheDepth) {
   };
   // Slide at constant depth over one ball, across the seam, onto the other.
   int counted = 0, off = 0, wrong_side = 0;
+  std::vector<Vec3f> points;
   for (const Vec3d& surface_m : outline) {
     const Vec3d centre = norm(surface_m - balls[0].centre_m) < balls[0].radius_m + 1e-6 ? balls[0].centre_m
                                                                                         : balls[1].centre_m;
     const Vec3d p = surface_m - 0.02 * normalized(surface_m - centre);
-    const Answer answer = object.query(cast<float>(p), {Layer::kThree});
+    points.push_back(cast<float>(p));
+    const Answer answer = object.query(points.back(), {Layer::kThree});
     const double ratio = -answer.signed_distance_m / distance_m(p);
     ++counted;
     wrong_side += !answer.inside;
     off += !(ratio > 0.5 && ratio < 1.5);
   }
+  EXPECT_TRUE(test::every_target_agrees(object, points, {Layer::kThree}));
   EXPECT_GT(counted, 4000);
   EXPECT_EQ(wrong_side, 0);
   EXPECT_EQ(off, 0) << "depth jumps at the seam";
