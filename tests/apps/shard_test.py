@@ -218,6 +218,12 @@ class Shards(FolderTest):
                 self.submit(options=options)
         self.assertEqual({path.name: path.read_bytes() for path in records.iterdir()}, before, "nothing was submitted")
 
+    def test_submit_refuses_costs_beside_those_it_keeps(self):
+        for option in (["--costs", "old.ndjson"], ["--costs=old.ndjson"]):
+            with self.assertRaisesRegex(AssertionError, "--costs: submit keeps"):
+                self.submit(options=option)
+        self.assertFalse((self.folder / "farm").exists())
+
     def test_an_earlier_run_in_more_shards_does_not_speak_for_this_one(self):
         self.assertEqual(self.submit(shards=4), "merge ended with 0")
         write_off(self.models / "m0.off", sphere(1, 9))
