@@ -130,6 +130,10 @@ class Smoke(SmokeRun):
         self.assertEqual({row["work"] for row in self.results["frames"]},
                          {"touching", "far", "grasp", "costume", "scene"})
         self.assertEqual({row["shell_percent"] for row in self.results["accuracy"]}, {0.5, 3.0})
+        sized = {(row["model"], row["peer"]) for row in self.results["peers"] if row["bytes"] > 0 and row["build_s"] > 0}
+        for table in ("frames", "accuracy"):
+            self.assertLessEqual({(row["model"], row["peer"]) for row in self.results[table] if row.get("work") != "scene"},
+                                 sized, table)
 
     def test_every_peer_answers_within_the_error_it_states(self):
         self.assertTrue(all(check["holds"] for check in self.results["checks"]))
