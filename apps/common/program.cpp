@@ -6,6 +6,7 @@
 #include <map>
 #include <memory>
 #include <new>
+#include <optional>
 #include <sstream>
 #include <string>
 #include <string_view>
@@ -76,8 +77,12 @@ const CLI::App& deepest(const CLI::App& app) {
   return *at;
 }
 
-/// What the first argument that looks like an option but is none was probably meant to be.
-std::string suggestion(const CLI::App& app, int argc, char** argv) {
+/// The first argument that looks like an option but is none, and which it probably was meant to be, if any.
+struct Mistyped {
+  std::string word, guess;
+};
+
+std::optional<Mistyped> mistyped_option(const CLI::App& app, int argc, char** argv) {
   std::vector<std::string> names;
   for (const CLI::App* at = &deepest(app); at != nullptr; at = at->get_parent())
     for (const CLI::Option* option : at->get_options())
@@ -87,9 +92,9 @@ std::string suggestion(const CLI::App& app, int argc, char** argv) {
     const std::string name(word.substr(0, word.find('=')));
     if (name == "--") break;
     if (name.starts_with("--") && std::ranges::find(names, name) == names.end())
-      return did_you_mean(name, names);
+      return Mistyped{name, did_you_mean(name, names)};
   }
-  return "";
+  return std::nullopt;
 }
 
 /// CLI11 would call an unknown command an unexpected argument.
@@ -133,7 +138,10 @@ std::string one_line(std::string text) {
 
 Exit parse_and_run(const Program& program, Console& console, int argc, char** argv) {
   if (const char* name = unknown_command(program, argc, argv)) {
-    const std::string guess = did_you_mean(name, names_of(program));
+    const std::string_view word(name);
+    const bool is_option = word == "help" || word == "version";  // a command of other programs
+    const std::string guess =
+        is_option ? fmt::format("; did you mean `--{}`?", word) : did_you_mean(word, names_of(program));
     console.error(fmt::format("unknown command `{}`{}", name,
                               guess.empty() ? "; the commands are " + command_names(program) : guess));
     return Exit::kUsage;
@@ -180,12 +188,18 @@ Exit parse_and_run(const Program& program, Console& console, int argc, char** ar
       console.error(unknown);
       return Exit::kUsage;
     }
-    const bool is_extra = problem.get_exit_code() == static_cast<int>(CLI::ExitCodes::ExtrasError);
+    const std::optional<Mistyped> mistyped = mistyped_option(deepest(app), argc, argv);
+    const auto is = [&](CLI::ExitCodes code) { return problem.get_exit_code() == static_cast<int>(code); };
+    // What is missing may stand there, mistyped; CLI11 looks for what is missing first.
+    std::string finding = one_line(problem.what());
+    if (is(CLI::ExitCodes::RequiredError) && mistyped)
+      finding = fmt::format("The following argument was not expected: {}", mistyped->word);
+    if (mistyped && (is(CLI::ExitCodes::RequiredError) || is(CLI::ExitCodes::ExtrasError)))
+      finding += mistyped->guess;
     std::string names;
     for (const CLI::App* at = &deepest(app); at != nullptr; at = at->get_parent())
       names.insert(0, at->get_name() + (names.empty() ? "" : " "));
-    console.error(fmt::format("{}{}; see `{} --help`", one_line(problem.what()),
-                              is_extra ? suggestion(app, argc, argv) : "", names));
+    console.error(fmt::format("{}; see `{} --help`", finding, names));
     return Exit::kUsage;
   }
   console.set_color(color);

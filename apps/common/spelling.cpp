@@ -14,15 +14,18 @@ namespace {
 // Longer texts are no misspelt names; the bound keeps the table small.
 constexpr std::size_t kLongestName = 64;
 
-/// Optimal string alignment distance.
+char lower(char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; }
+
+/// Optimal string alignment distance, where capitals are as good as small letters.
 std::size_t distance(std::string_view a, std::string_view b) {
   std::vector<std::size_t> before(b.size() + 1), last(b.size() + 1), row(b.size() + 1);
   for (std::size_t k = 0; k <= b.size(); ++k) last[k] = k;
   for (std::size_t i = 1; i <= a.size(); ++i) {
     row[0] = i;
     for (std::size_t k = 1; k <= b.size(); ++k) {
-      row[k] = std::min({last[k] + 1, row[k - 1] + 1, last[k - 1] + (a[i - 1] == b[k - 1] ? 0 : 1)});
-      if (i > 1 && k > 1 && a[i - 1] == b[k - 2] && a[i - 2] == b[k - 1])
+      row[k] =
+          std::min({last[k] + 1, row[k - 1] + 1, last[k - 1] + (lower(a[i - 1]) == lower(b[k - 1]) ? 0 : 1)});
+      if (i > 1 && k > 1 && lower(a[i - 1]) == lower(b[k - 2]) && lower(a[i - 2]) == lower(b[k - 1]))
         row[k] = std::min(row[k], before[k - 2] + 1);
     }
     before.swap(last);
@@ -39,7 +42,8 @@ std::string nearest_name(std::string_view text, std::span<const std::string> nam
   std::size_t least = std::max<std::size_t>(1, text.size() / 3) + 1;
   for (const std::string& name : names) {
     const std::size_t edits = distance(text, name);
-    if (edits < least) {
+    // Edits of every letter make any word of any other.
+    if (edits < least && edits < std::max(text.size(), name.size())) {
       least = edits;
       nearest = name;
     }

@@ -8,7 +8,8 @@
 namespace sqmap::apps {
 
 /// The name that `text` was probably meant to be: the one that takes the fewest insertions, deletions,
-/// replacements and swaps of neighbours, at most one for each three letters. Empty when nothing is near.
+/// replacements and swaps of neighbours, at most one for each three letters; capitals are no mistake. Empty
+/// when nothing is near.
 std::string nearest_name(std::string_view text, std::span<const std::string> names);
 
 /// "; did you mean `NAME`?", or nothing.

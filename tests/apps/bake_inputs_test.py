@@ -265,12 +265,18 @@ class Spelling(unittest.TestCase):
         for arguments, meant in ((("bake", "x.off", "--max-eror", "1%"), "`--max-error`"),
                                  (("bake", "x.off", "--timout=3"), "`--timeout`"),
                                  (("config", "show", "x.off", "--no-cofnig"), "`--no-config`"),
+                                 (("--versoin",), "`--version`"),
+                                 (("report", "x.ndjson", "--outptu", "x.html"), "`--output`"),
+                                 (("bake", "x.off", "--up", "Z"), "`z`"),
+                                 (("help",), "`--help`"),
+                                 (("version",), "`--version`"),
                                  (("bkae", "x.off"), "`bake`")):
             with self.subTest(arguments=arguments):
                 result = run("sqbake", *arguments)
                 self.assertEqual(result.returncode, 2)
                 self.assertIn(f"did you mean {meant}?", result.stderr)
         self.assertNotIn("did you mean", run("sqbake", "bake", "x.off", "--colourful-fireworks").stderr)
+        self.assertNotIn("did you mean", run("sqbake", "bake", "x.off", "--up", "w").stderr)
 
     def refuse(self, arguments, message):
         with self.subTest(arguments=arguments):
