@@ -82,9 +82,9 @@ std::function<Exit(Console&)> declare_config(CLI::App& app) {
   app.description(
       "Shows the settings that `sqbake bake` would use for a mesh, and where each was given. The later wins: "
       "built\n"
-      "in, [default] of sqbake.toml, [default] and [[asset]] of the manifest, matching [[rule]]s of "
-      "sqbake.toml in\n"
-      "their order, the sidecar, the command line.\n"
+      "in, [default] of sqbake.toml, [default] of the manifest, matching [[rule]]s of sqbake.toml in their "
+      "order,\n"
+      "the manifest's [[asset]], the sidecar, the command line.\n"
       "\n"
       "Examples:\n"
       "  sqbake config show models/hand.off\n"

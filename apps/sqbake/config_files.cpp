@@ -91,7 +91,6 @@ Result<EffectiveSettings> ConfigFiles::settings_of(const fs::path& mesh, const M
     lay_over(values, manifest->defaults);
     effective.files.push_back(manifest->path);
   }
-  if (asset != nullptr) lay_over(values, asset->values);
   if (project != nullptr) {
     std::error_code code;
     const fs::path base = fs::absolute(project->path, code).lexically_normal().parent_path();
@@ -100,6 +99,7 @@ Result<EffectiveSettings> ConfigFiles::settings_of(const fs::path& mesh, const M
     for (const ConfigRule& rule : project->rules)
       if (glob_matches(rule.pattern, relative, true)) lay_over(values, rule.values);
   }
+  if (asset != nullptr) lay_over(values, asset->values);
   if (request_.use_files) {
     const Result<std::optional<fs::path>> sidecar = sidecar_of(mesh);
     if (!sidecar) return sidecar.error();

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Where the settings of a mesh come from, the stronger source later:
 //
-//   built in < [default] of the project file < [default] of the manifest < the manifest's [[asset]]
-//            < the matching [[rule]]s of the project file in their order < the sidecar < the command line
+//   built in < [default] of the project file < [default] of the manifest
+//            < the matching [[rule]]s of the project file in their order
+//            < the manifest's [[asset]] < the sidecar < the command line
 //
 // The project file is the nearest `sqbake.toml` in the folder of the mesh or above it; the sidecar of
 // hand.off is hand.off.sqbake.toml or hand.sqbake.toml beside it. A quality counts as the limits that it
