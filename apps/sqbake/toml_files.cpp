@@ -41,11 +41,13 @@ Result<toml::table> parse(const fs::path& path) {
   }
 }
 
-/// The text of a string or a number as the command line would give it.
+/// The text of a value as the command line would give it. No setting takes true or false: the message that
+/// refuses them says what it takes.
 std::optional<std::string> text_of(const toml::node& node) {
   if (auto text = node.value_exact<std::string>()) return text;
   if (const auto number = node.value_exact<std::int64_t>()) return fmt::to_string(*number);
   if (const auto number = node.value_exact<double>()) return fmt::format("{}", *number);
+  if (const auto truth = node.value_exact<bool>()) return *truth ? "true" : "false";
   return std::nullopt;
 }
 

@@ -203,6 +203,7 @@ class Settings(FolderTest):
                  ("sqbake.toml", "unit = 1\n", [":1", "unknown key `unit`", "[default]"]),
                  ("sqbake.toml", "[default]\nup = \"w\"\n", [":2", "`w`", "x, y, z"]),
                  ("sqbake.toml", "[default]\nup = [1]\n", [":2", "up"]),
+                 ("sqbake.toml", "[default]\nconservative = true\n", [":2", "conservative: `true`, must be one of off, on"]),
                  ("sqbake.toml", '[default]\nquality = "good"\n', [":2", "`good`", "draft, standard, fine"]),
                  ("sqbake.toml", "[default\n", ["sqbake.toml:1"]),
                  ("sqbake.toml", "[[rule]]\nunit = 1\n", [":1", "match"]),
