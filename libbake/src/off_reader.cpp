@@ -29,7 +29,8 @@ class OffParser {
   }
   Error unexpected(std::string_view word, const std::string& where, const std::string& wanted) const {
     if (word.empty())
-      return damaged("the file ends within " + where, "the file is cut short: copy or export it again");
+      return damaged("the file ends within " + where,
+                     "the file is cut short, or has more than one vertex or face a line: export it again");
     return damaged(where + ": found " + quoted(word) + ", need " + wanted);
   }
 

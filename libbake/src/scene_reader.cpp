@@ -2,9 +2,11 @@
 #include "scene_reader.hpp"
 
 #include <algorithm>
+#include <cctype>
 #include <exception>
 #include <limits>
 #include <string>
+#include <string_view>
 #include <system_error>
 #include <utility>
 
@@ -116,6 +118,30 @@ Result<PolygonMesh> join(const aiScene& scene, const fs::path& path) {
   return all;
 }
 
+/// Whether a list such as "gltf glb" holds the extension of a path.
+bool lists_extension(std::string_view extensions, const fs::path& path) {
+  std::string wanted = path.extension().string();
+  std::ranges::transform(wanted, wanted.begin(), [](unsigned char c) { return std::tolower(c); });
+  for (std::size_t start = 0; start < extensions.size();) {
+    const std::size_t end = std::min(extensions.find(' ', start), extensions.size());
+    if (!wanted.empty() && extensions.substr(start, end - start) == std::string_view(wanted).substr(1))
+      return true;
+    start = end + 1;
+  }
+  return false;
+}
+
+/// assimp goes by content, too: any name would lead to each of its formats, the rare ones with their
+/// overflows, and PLY, where it never ends on some broken headers.
+void keep_importers_of(const fs::path& path, Assimp::Importer& importer) {
+  for (std::size_t k = importer.GetImporterCount(); k > 0; --k) {
+    if (lists_extension(importer.GetImporterInfo(k - 1)->mFileExtensions, path)) continue;
+    Assimp::BaseImporter* other = importer.GetImporter(k - 1);
+    importer.UnregisterLoader(other);
+    delete other;  // NOLINT(cppcoreguidelines-owning-memory): unregistering hands it back
+  }
+}
+
 }  // namespace
 
 Result<PolygonMesh> read_scene(const fs::path& path) {
@@ -123,11 +149,7 @@ Result<PolygonMesh> read_scene(const fs::path& path) {
       "check that the file opens in another program, or convert it to OFF, PLY or GLB";
   try {
     Assimp::Importer importer;
-    // assimp goes by content, too, and never ends on some broken PLY headers; .ply has a reader of its own.
-    if (Assimp::BaseImporter* ply = importer.GetImporter("ply"); ply != nullptr) {
-      importer.UnregisterLoader(ply);
-      delete ply;  // NOLINT(cppcoreguidelines-owning-memory): unregistering hands it back
-    }
+    keep_importers_of(path, importer);
     importer.SetIOHandler(new FolderIo(path));                                     // the importer owns it
     importer.SetPropertyBool(AI_CONFIG_IMPORT_COLLADA_IGNORE_UP_DIRECTION, true);  // ReadOptions::up decides
     // No post-processing: it would triangulate and so lose the numbers of the polygons.

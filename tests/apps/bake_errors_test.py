@@ -24,6 +24,9 @@ class BadInput(FolderTest):
         ("huge.off", "OFF\n4000000000 4000000000 0\n0 0 0\n", 4),
         ("words.obj", "this is not a mesh\n", 4),
         ("words.glb", "this is not a mesh\n", 4),
+        ("other.glb", off_text(*box()), 4),  # a name leads to the readers of its format alone
+        ("other.obj", "solid x\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\n"
+                      "endloop\nendfacet\nendsolid x\n", 4),
     ]
 
     def check(self, result, name, code):
@@ -50,6 +53,15 @@ class BadInput(FolderTest):
             message = run("sqbake", *arguments).stderr
             self.assertTrue(message.startswith(f"sqbake: error: {source}"), message)
             self.assertEqual(message.count("short.off"), 1, message)
+
+    def test_more_than_one_face_a_line_is_told_as_what_it_may_be(self):
+        lines = off_text(*box()).splitlines()
+        source = self.folder / "joined.off"
+        for joined in (lines[:2] + [" ".join(lines[2:10])] + lines[10:], lines[:10] + [" ".join(lines[10:])]):
+            source.write_text("\n".join(joined) + "\n", encoding="ascii")
+            result = run("sqbake", "check", source)
+            self.check(result, "joined.off", 4)
+            self.assertIn("more than one vertex or face a line", result.stderr)
 
     def test_a_line_feed_in_a_name_forges_no_line(self):
         (self.folder / "models").mkdir()
