@@ -34,9 +34,12 @@ Forecast forecast(const std::optional<BundleCache>& cache, const Job& job) {
 }
 
 Json plan_json(const Job& job, const std::optional<Forecast>& forecast) {
-  Json json{{"schema", kBakeSchema},          {"type", "plan"},
-            {"input", job.input.string()},    {"output", job.output.string()},
-            {"input_bytes", job.input_bytes}, {"settings", Json::object()}};
+  Json json{{"schema", kBakeSchema},
+            {"type", "plan"},
+            {"input", json_name(job.input.string())},
+            {"output", json_name(job.output.string())},
+            {"input_bytes", job.input_bytes},
+            {"settings", Json::object()}};
   for (const auto& [name, value] : job.settings)
     json["settings"][name] = {{"value", value.text}, {"source", value.source}};
   if (forecast) {

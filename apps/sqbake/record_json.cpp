@@ -123,8 +123,8 @@ BakeRecord record_from(const Json& json) {
 std::string record_line(const BakeRecord& record) {
   Json json{{"schema", kBakeSchema},
             {"type", "asset"},
-            {"input", record.input},
-            {"output", record.output},
+            {"input", json_name(record.input)},
+            {"output", json_name(record.output)},
             {"outcome", verdict_name(record.verdict)},
             {"seconds", record.seconds},
             {"cached", record.is_cached}};

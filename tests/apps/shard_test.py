@@ -152,6 +152,27 @@ class Shards(FolderTest):
         self.assertEqual(self.merge("cut", "--plan", "plan")[:2], (0, ""), "the plan tells that all is there")
         self.assertEqual(self.merge("whole", "--plan", "empty")[0], 4)
 
+    def test_names_that_differ_in_bytes_that_are_no_utf8_stay_apart(self):
+        models, options = self.folder / "few", ("--out-dir", self.folder / "out", "--format", "ndjson")
+        models.mkdir()
+        for number, name in enumerate((b"n\xfe.off", b"n\xff.off", b"n\xef\xbf\xbd.off", "n\u65e5\U0001d11e.off".encode())):
+            write_off(models / os.fsdecode(name), sphere(0, 1 + number))
+        bake = run("sqbake", "bake", models, *options, *ROUGH)
+        plan = run("sqbake", "plan", models, *options, "--shards", "2").stdout
+        (self.folder / "records").write_text(bake.stdout, encoding="utf-8")
+        (self.folder / "plan").write_text(plan, encoding="utf-8")
+        code, messages, merged = self.merge("records", "records", "--plan", "plan")
+        self.assertEqual((code, messages), (0, ""))
+        *assets, summary = map(json.loads, merged.splitlines())
+        names = {os.path.basename(asset["input"]) for asset in assets}
+        self.assertEqual((len(assets), summary["duplicates"]), (4, 4))
+        self.assertLessEqual({"n\ufffd.off", "n\u65e5\U0001d11e.off"}, names, "what is UTF-8 stays as it is")
+        dealt = run("sqbake", "plan", models, *options, "--costs", self.folder / "records").stderr
+        self.assertNotIn("tells of no bake", dealt)
+        (models / "a\nb.off").write_bytes((models / os.fsdecode(b"n\xff.off")).read_bytes())
+        shown = run("sqbake", "plan", models, *options[:2], "--shard", "1/1", errors="replace").stdout
+        self.assertEqual(len(shown.splitlines()), 5, shown)
+
     def test_a_merge_finds_two_runs_that_gave_different_bytes_by_their_hashes_alone(self):
         mesh = self.models / "m0.off"
         options = ("-o", self.folder / "m.h5", "--format", "ndjson", *ROUGH)

@@ -11,6 +11,7 @@
 
 #include "../../common/choices.hpp"
 #include "../../common/json_text.hpp"
+#include "../../common/printable.hpp"
 #include "../commands.hpp"
 #include "../job_list.hpp"
 #include "../settings.hpp"
@@ -57,14 +58,14 @@ Exit run_plan(Console& console, const PlanArguments& arguments) {
     if (arguments.format == "ndjson") {
       console.out(json_line({{"schema", "sqmap.plan/1"},
                              {"type", "plan"},
-                             {"input", job.input.string()},
-                             {"output", job.output.string()},
+                             {"input", json_name(job.input.string())},
+                             {"output", json_name(job.output.string())},
                              {"input_bytes", job.input_bytes},
                              {"cost", cost},
                              {"shard", shard_of[k] + 1},
                              {"shards", count}}));
     } else if (only) {
-      console.out(fmt::format("{} -> {}\n", job.input.string(), job.output.string()));
+      console.out(printable(fmt::format("{} -> {}", job.input.string(), job.output.string())) + "\n");
     }
   }
   if (arguments.format == "text" && !only) {

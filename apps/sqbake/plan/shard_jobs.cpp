@@ -6,6 +6,7 @@
 
 #include <fmt/format.h>
 
+#include "../../common/json_text.hpp"
 #include "costs.hpp"
 
 namespace sqmap::apps {
@@ -13,7 +14,7 @@ namespace sqmap::apps {
 Result<std::vector<std::uint64_t>> costs_of(Console& console, const JobList& list,
                                             const std::filesystem::path& records) {
   std::vector<InputFile> inputs;
-  for (const Job& job : list.jobs) inputs.push_back({job.input.string(), job.input_bytes});
+  for (const Job& job : list.jobs) inputs.push_back({json_name(job.input.string()), job.input_bytes});
   BakeTimes times;
   if (!records.empty()) {
     const Result<AssetRecords> read = read_asset_records(records);
