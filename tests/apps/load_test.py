@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """scripts/load_test bakes as many meshes as it is told to, and finds a process or a file that a run leaves behind."""
+import importlib.machinery
+import importlib.util
 import os
 import re
 import subprocess
@@ -36,6 +38,19 @@ class LoadTest(FolderTest):
         self.assertEqual((code, rows), (0, [(1, 0, 0, 0), (2, 0, 0, 0)]), text)
         for run, count in (("j1", 1), ("j2", 2)):
             self.assertEqual(len(list((kept / run).iterdir())), count)
+
+    def test_a_file_that_stays_open_is_told_from_one_that_is_open_for_a_moment(self):
+        loader = importlib.machinery.SourceFileLoader("load_script", str(LOAD_TEST))
+        script = importlib.util.module_from_spec(importlib.util.spec_from_loader("load_script", loader))
+        loader.exec_module(script)
+        starting, ending, moment = [(0, 100, 3)] * 9, [(99, 100, 5)] * 9, (100, 11)
+        steady = [(done, 100, 9) for done in range(1, 99) for _ in range(5)]
+        with_moments = [look if i % 5 else (look[0], *moment) for i, look in enumerate(steady)]
+        first, last = script.first_and_last(starting + with_moments + ending, 2, 100)
+        self.assertEqual((first, last), ((100, 9), (100, 9)))
+        leaking = [(done, memory, files + (done > 60)) for done, memory, files in with_moments]
+        first, last = script.first_and_last(starting + leaking + ending, 2, 100)
+        self.assertEqual((first, last), ((100, 9), (100, 10)))
 
     def test_a_stop_ends_the_baker_and_removes_what_was_written(self):
         (self.folder / "tmp").mkdir()
