@@ -35,7 +35,7 @@
 #include <hwy/highway.h>
 
 // The larger parts of a kernel. Inlined they are one loop without calls; with sanitizers that loop grows
-// until GCC takes minutes over it.
+// until compilers take minutes over it.
 #undef SQMAP_KERNEL
 #if defined(SQMAP_SANITIZED)
 #define SQMAP_KERNEL HWY_NOINLINE

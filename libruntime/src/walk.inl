@@ -70,8 +70,8 @@ class Walker {
   static constexpr int kFirstSteps = 2;
   static constexpr std::uint32_t kNobody = kMostEntries;  // an entry that nobody reads
 
-  HWY_INLINE void solve(Walk& walk, const VPatch& patch, const V3& error, M lanes) const noexcept;
-  HWY_INLINE M advance(Walk& walk, VCell& cell, M active) const noexcept;
+  SQMAP_KERNEL void solve(Walk& walk, const VPatch& patch, const V3& error, M lanes) const noexcept;
+  SQMAP_KERNEL M advance(Walk& walk, VCell& cell, M active) const noexcept;
   /// Lanes whose next step is not worth its while.
   HWY_INLINE M is_over(const Walk& walk) const noexcept {
     const float least_gain = kLeastGain * part_.depth_step;
@@ -83,14 +83,14 @@ class Walker {
   HWY_NOINLINE void set_out(std::uint32_t i, M wanted, EntryList& strays) noexcept;
   HWY_NOINLINE void set_out_strays(const EntryList& strays) noexcept;
   HWY_NOINLINE void set_out_again(std::uint32_t begin, std::uint32_t end, EntryList& remote) noexcept;
-  HWY_INLINE void go(Walk& walk, VCell& cell, VI entry, M lanes) noexcept;
+  SQMAP_KERNEL void go(Walk& walk, VCell& cell, VI entry, M lanes) noexcept;
   HWY_NOINLINE void go_on() noexcept;
   HWY_NOINLINE void keep(Walk& walk, VI entry, M lanes) noexcept;
   HWY_NOINLINE void end(const Walk& walk, VI entry, M lanes) noexcept;
   HWY_NOINLINE M set_aside(const Walk& walk, const VCell& cell, VI entry, M lanes) noexcept;
   HWY_NOINLINE void fans() noexcept;
-  HWY_INLINE void write(VI entry, M lanes, V row, V col, V on_rim, V distance, const V3& surface,
-                        const V3& normal) noexcept;
+  SQMAP_KERNEL void write(VI entry, M lanes, V row, V col, V on_rim, V distance, const V3& surface,
+                          const V3& normal) noexcept;
 
   const Looker& looker_;
   const PartRecord& part_;
@@ -103,7 +103,7 @@ class Walker {
 };
 
 /// Chart::step_towards, for some lanes.
-HWY_INLINE void Walker::solve(Walk& walk, const VPatch& patch, const V3& error, M lanes) const noexcept {
+SQMAP_KERNEL void Walker::solve(Walk& walk, const VPatch& patch, const V3& error, M lanes) const noexcept {
   const V one = all(1.0F);
   const V a = dot3(patch.row, patch.row), b = dot3(patch.row, patch.col), c = dot3(patch.col, patch.col);
   const V f = dot3(patch.row, error), g = dot3(patch.col, error);
@@ -149,7 +149,7 @@ SQMAP_KERNEL Walk Walker::begin(const V3& p, V row, V col, VCell& cell, M& eligi
 }
 
 /// One step of the active lanes; those that are not over. `cell` is that of (row, col).
-HWY_INLINE M Walker::advance(Walk& walk, VCell& cell, M active) const noexcept {
+SQMAP_KERNEL M Walker::advance(Walk& walk, VCell& cell, M active) const noexcept {
   const V zero = hn::Zero(kD), one = all(1.0F), least_step = all(kLeastCellStep), size = all(looker_.size());
   active = hn::AndNot(is_over(walk), active);
   if (none(active)) return active;
@@ -205,7 +205,7 @@ HWY_INLINE M Walker::advance(Walk& walk, VCell& cell, M active) const noexcept {
   return active;
 }
 
-HWY_INLINE void Walker::go(Walk& walk, VCell& cell, VI entry, M lanes) noexcept {
+SQMAP_KERNEL void Walker::go(Walk& walk, VCell& cell, VI entry, M lanes) noexcept {
   M active = lanes;
   for (int step = 0; step < kFirstSteps; ++step) {
     active = advance(walk, cell, active);
@@ -410,8 +410,8 @@ HWY_NOINLINE void Walker::end(const Walk& walk, VI entry, M lanes) noexcept {
   write(entry, lanes, walk.row, walk.col, walk.on_rim, distance, walk.point, normal);
 }
 
-HWY_INLINE void Walker::write(VI entry, M lanes, V row, V col, V on_rim, V distance, const V3& surface,
-                              const V3& normal) noexcept {
+SQMAP_KERNEL void Walker::write(VI entry, M lanes, V row, V col, V on_rim, V distance, const V3& surface,
+                                const V3& normal) noexcept {
   const VI nobody = all_int(kNobody), at = pick(lanes, entry, nobody);
   const VI flags = hn::GatherIndex(kDI, entries_.flags, at);
   // A crossing that is on no patch stands where it is nearer.
