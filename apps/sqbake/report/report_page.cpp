@@ -27,7 +27,7 @@ constexpr const char* kStyle =
     "body{font:15px/1.45 system-ui,sans-serif;max-width:70em;margin:2em auto;padding:0 1em}"
     "table{border-collapse:collapse;margin:1em 0;font-size:13px;font-variant-numeric:tabular-nums}"
     "td,th{padding:3px 9px;border-bottom:1px solid #8886;text-align:right;vertical-align:top}"
-    "td.t,th.t{text-align:left;overflow-wrap:anywhere;min-width:7em}"
+    "td.t,th.t{text-align:left;overflow-wrap:break-word;min-width:7em;max-width:30em}"
     "th button{all:unset;cursor:pointer}th button:focus-visible{outline:2px solid}"
     ".bar{display:flex;width:16em;height:1.1em}.bar i{display:block;min-width:1px}"
     ".gallery{display:flex;flex-wrap:wrap;gap:1em}figure{margin:0;width:300px;font-size:13px}"
