@@ -15,7 +15,7 @@
 namespace sqmap::runtime {
 
 struct Object::Impl {
-  explicit Impl(const Asset& asset) : resident(asset), sphere(asset.sphere), r_max_m(asset.r_max_m) {
+  explicit Impl(const Asset& asset) : resident(asset), sphere(sphere_around(asset)), r_max_m(asset.r_max_m) {
     for (const Part& part : asset.parts) {
       level_count = std::max(level_count, part.map.level_count);
       bound_tolerance_m = part.bounds.cells > 0 ? std::max(bound_tolerance_m, part.bounds.tolerance_m)

@@ -163,13 +163,29 @@ float square_of_ball(const BoundingSphere& sphere, double units_per_m) {
   return rounded_up(radius * radius);
 }
 
+}  // namespace
+
+BoundingSphere sphere_around(const Asset& asset) noexcept {
+  BoundingSphere sphere = asset.sphere;
+  for (const Part& part : asset.parts) {
+    const double off_m = norm(part.object_from_part.translation_m - sphere.centre_m);
+    sphere.radius_m = std::max(sphere.radius_m, off_m + bounding_radius_m(part.shape));
+  }
+  return sphere;
+}
+
+namespace {
+
 BoundingSphere seen_from(const Vec3f& origin_m, const BoundingSphere& sphere) {
   return {sphere.centre_m - cast<double>(origin_m), sphere.radius_m};
 }
 
 PartRecord put_part(Layout& out, const Part& part, const Curves& curves, const Vec3f& origin_m,
                     double units_per_m) {
-  const BoundingSphere sphere = seen_from(origin_m, part.sphere);
+  // Not the stored sphere: readers do not check that it holds the superquadric, and points would then be
+  // dropped with one block and kept with another.
+  const BoundingSphere sphere =
+      seen_from(origin_m, {part.object_from_part.translation_m, bounding_radius_m(part.shape)});
   const DistanceMap& map = part.map;
   PartRecord record;
   record.semi_axes = cast<float>(units_per_m * part.shape.semi_axes_m);
@@ -267,7 +283,7 @@ Resident::Resident(const Asset& asset) : part_count_(static_cast<std::uint32_t>(
   constexpr double kFarRadii = 8;
   if (norm(asset.sphere.centre_m) > kFarRadii * asset.sphere.radius_m)
     origin_m_ = cast<float>(asset.sphere.centre_m);
-  const BoundingSphere sphere = seen_from(origin_m_, asset.sphere);
+  const BoundingSphere sphere = seen_from(origin_m_, sphere_around(asset));
   sphere_centre_ = cast<float>(units_per_m * sphere.centre_m);
   sphere_radius_ = rounded_up(units_per_m * sphere.radius_m);
   sphere_square_ = square_of_ball(sphere, units_per_m);

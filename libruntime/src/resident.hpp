@@ -198,6 +198,10 @@ class Resident {
   float sphere_radius_{}, sphere_square_{};
 };
 
+/// The sphere of the asset, or a larger one where a superquadric reaches beyond it: FORMAT.md's rule 56 is
+/// not checked by readers.
+BoundingSphere sphere_around(const Asset& asset) noexcept;
+
 /// The next float at or above a double.
 float rounded_up(double value) noexcept;
 
