@@ -7,6 +7,7 @@
 #include <limits>
 #include <new>
 #include <optional>
+#include <string>
 #include <utility>
 
 #include <embree3/rtcore.h>
@@ -196,10 +197,12 @@ bool look(RTCPointQueryFunctionArguments* arguments) {
 }  // namespace
 
 struct MeshBoxes::Impl {
-  explicit Impl(const Mesh& mesh) : faces(mesh.faces) {
+  Impl(const Mesh& mesh, const std::string& widest) : faces(mesh.faces) {
     normalise(mesh);
     // Embree would reserve 128 MB for the tessellation of surfaces that are not here.
-    device = rtcNewDevice("tessellation_cache_size=0");
+    std::string settings = "tessellation_cache_size=0";
+    if (!widest.empty()) settings += ",max_isa=" + widest;
+    device = rtcNewDevice(settings.c_str());
     if (device == nullptr) throw std::bad_alloc();
     scene = rtcNewScene(device);
     rtcSetSceneFlags(scene, RTC_SCENE_FLAG_ROBUST);
@@ -303,26 +306,26 @@ void MeshBoxes::Impl::trace_one(const Ray& ray, RayQuery& query) const {
 
 void MeshBoxes::Impl::trace_packet(std::span<const Ray> rays, RayQuery& query) const {
   alignas(64) std::array<int, kPacket> valid{};
-  RTCRayHit16 packet;
-  for (std::size_t k = 0; k < rays.size(); ++k) {
-    const auto start = float_ray(rays[k], query.first_t, query.rays[k]);
+  RTCRayHit16 packet{};
+  for (std::size_t k = 0; k < kPacket; ++k) {
+    RTCRay16& ray = packet.ray;
+    ray.id[k] = static_cast<unsigned>(k);
+    ray.mask[k] = 0xFFFFFFFF;
+    packet.hit.geomID[k] = RTC_INVALID_GEOMETRY_ID;
+    packet.hit.instID[0][k] = RTC_INVALID_GEOMETRY_ID;
+    const auto start = k < rays.size() ? float_ray(rays[k], query.first_t, query.rays[k]) : std::nullopt;
+    // An empty ray says that it is none: where processors have no vectors of 16, Embree 3.13 cuts the packet
+    // and forgets `valid`.
+    ray.tfar[k] = (start ? 1.0F : -1.0F) * std::numeric_limits<float>::infinity();
     if (!start) continue;
     valid[k] = -1;
     const auto& [from, along] = *start;
-    RTCRay16& ray = packet.ray;
     ray.org_x[k] = from.x;
     ray.org_y[k] = from.y;
     ray.org_z[k] = from.z;
     ray.dir_x[k] = along.x;
     ray.dir_y[k] = along.y;
     ray.dir_z[k] = along.z;
-    ray.tnear[k] = ray.time[k] = 0;
-    ray.tfar[k] = std::numeric_limits<float>::infinity();
-    ray.mask[k] = 0xFFFFFFFF;
-    ray.id[k] = static_cast<unsigned>(k);
-    ray.flags[k] = 0;
-    packet.hit.geomID[k] = RTC_INVALID_GEOMETRY_ID;
-    packet.hit.instID[0][k] = RTC_INVALID_GEOMETRY_ID;
   }
   rtcIntersect16(valid.data(), scene, &query.context, &packet);
 }
@@ -346,7 +349,8 @@ void MeshBoxes::Impl::finish(std::vector<RayTracer::Hit>& hits) const {
   }
 }
 
-MeshBoxes::MeshBoxes(const Mesh& mesh) : impl_(std::make_unique<Impl>(mesh)) {}
+MeshBoxes::MeshBoxes(const Mesh& mesh, const std::string& widest)
+    : impl_(std::make_unique<Impl>(mesh, widest)) {}
 MeshBoxes::~MeshBoxes() = default;
 
 void MeshBoxes::trace(std::span<const Ray> rays, bool whole_lines,

@@ -5,6 +5,7 @@
 
 #include <memory>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "sqmap/bake/mesh.hpp"
@@ -14,7 +15,9 @@ namespace sqmap::bake {
 
 class MeshBoxes {
  public:
-  explicit MeshBoxes(const Mesh& mesh);
+  /// `widest`: as Embree names instruction sets ("sse4.2", "avx2"), none beyond which it may use; empty: all
+  /// that the processor has. The answers are the same.
+  explicit MeshBoxes(const Mesh& mesh, const std::string& widest = {});
   ~MeshBoxes();
   MeshBoxes(const MeshBoxes&) = delete;
   MeshBoxes& operator=(const MeshBoxes&) = delete;

@@ -10,6 +10,7 @@
 
 #include <gtest/gtest.h>
 
+#include "mesh_boxes.hpp"
 #include "support/shapes.hpp"
 
 #ifndef SQMAP_MESH_DIR
@@ -326,6 +327,31 @@ TEST(RayTracer, LinesTogetherMeetWhatTheyMeetAlone) {
   for (const auto& lines : {parallel, around, any}) {
     expect_together_as_alone(test::box({1, 1, 1}), lines);
     expect_together_as_alone(test::torus(0.7, 0.3, 64, 32), lines);
+  }
+}
+
+// Embree cuts packets where vectors are narrow. The last packet is not full.
+TEST(MeshBoxes, RaysMeetTheSameWithNarrowVectors) {
+  const Mesh mesh = test::torus(0.7, 0.3, 64, 32);
+  std::vector<RayTracer::Ray> lines;
+  Random random(13);
+  for (int k = 0; k < 37; ++k) lines.push_back({random.point(0.5), random.direction()});
+  lines[20].direction = {0, 0, 0};  // none
+  std::vector<std::vector<RayTracer::Hit>> expected(lines.size());
+  const RayTracer tracer(mesh);
+  std::size_t count = 0;
+  for (std::size_t k = 0; k < lines.size(); ++k) {
+    tracer.trace_line(lines[k].origin_m, lines[k].direction, expected[k]);
+    count += expected[k].size();
+  }
+  EXPECT_GT(count, lines.size());
+  for (const char* widest : {"sse4.2", "avx2"}) {
+    std::vector<std::vector<RayTracer::Hit>> hits(lines.size());
+    MeshBoxes(mesh, widest).trace(lines, true, hits);
+    for (std::size_t k = 0; k < lines.size(); ++k) {
+      ASSERT_EQ(hits[k].size(), expected[k].size()) << widest << ' ' << k;
+      for (std::size_t i = 0; i < hits[k].size(); ++i) EXPECT_EQ(hits[k][i].t_m, expected[k][i].t_m);
+    }
   }
 }
 
