@@ -10,22 +10,25 @@ class Charts {
   explicit Charts(const Resident& resident) noexcept : resident_(resident) {
     std::fill(std::begin(held_), std::end(held_), kNowhere);
   }
-  const ShapeTable<float>& table(std::uint32_t part) noexcept {
+  const Tables& of(std::uint32_t part) noexcept {
     // Parts of one chunk tend to be few: the slots go round.
     for (std::uint32_t k = 0; k < kTables; ++k)
       if (held_[k] == part) return tables_[k];
     const std::uint32_t slot = next_;
     next_ = (next_ + 1) % kTables;
     held_[slot] = part;
-    resident_.unpack(resident_.part(part), tables_[slot]);
-    return tables_[slot];
+    Tables& tables = tables_[slot];
+    resident_.unpack(resident_.part(part), tables.shape);
+    tables.eta.set(tables.shape.eta);
+    tables.omega.set(tables.shape.omega);
+    return tables;
   }
 
  private:
   static constexpr std::uint32_t kTables = 8;
   const Resident& resident_;
   std::uint32_t held_[kTables], next_ = 0;
-  ShapeTable<float> tables_[kTables];
+  Tables tables_[kTables];
 };
 
 /// Answers one chunk after another.
@@ -147,8 +150,7 @@ HWY_NOINLINE void Answerer::second_layer() noexcept {
   for (std::uint32_t r = 0; r < entries_.range_count; ++r) {
     const EntryRange& range = entries_.ranges[r];
     const PartRecord& part = resident_.part(range.part);
-    const Chart chart(resident_, part, charts_.table(range.part));
-    const Looker looker(resident_, part, chart, options_);
+    const Looker looker(resident_, part, charts_.of(range.part), options_);
     for (std::uint32_t i = range.begin; i < range.end; i += lane_count()) {
       const Look look = looker.look(load3(entries_.x, entries_.y, entries_.z, i),
                                     hn::FirstN(kD, range.end - i), wants_.reach);
@@ -181,8 +183,7 @@ HWY_NOINLINE void Answerer::third_layer(const Chunk& chunk, bool is_whole) noexc
     const EntryRange& range = entries_.ranges[r];
     const PartRecord& part = resident_.part(range.part);
     if (layer_for(part, options_) != Layer::kThree) continue;
-    const Chart chart(resident_, part, charts_.table(range.part));
-    const Looker looker(resident_, part, chart, options_);
+    const Looker looker(resident_, part, charts_.of(range.part), options_);
     Walker(looker, wants_, entries_).refine(range.begin, range.end, asked_);
   }
 }
@@ -227,8 +228,7 @@ HWY_NOINLINE void Answerer::offset(Findings& findings) noexcept {
   for (std::uint32_t r = 0; r < entries_.range_count; ++r) {
     const EntryRange& range = entries_.ranges[r];
     const PartRecord& part = resident_.part(range.part);
-    const Chart chart(resident_, part, charts_.table(range.part));
-    const Looker looker(resident_, part, chart, options_);
+    const Looker looker(resident_, part, charts_.of(range.part), options_);
     for (std::uint32_t i = range.begin; i < range.end; i += lane_count()) {
       const VI flags = hn::LoadU(kDI, entries_.flags + i);
       const M answers = as_float(hn::Ne(hn::And(flags, hn::Set(kDI, kAnswer)), hn::Zero(kDI)));
@@ -256,8 +256,7 @@ HWY_NOINLINE void Answerer::mark_wanted(bool is_whole, Findings& findings) noexc
 /// Surfaces and normals of the entries that want them, in the object's frame.
 HWY_NOINLINE void Answerer::place(const EntryRange& range) noexcept {
   const PartRecord& part = resident_.part(range.part);
-  const Chart chart(resident_, part, charts_.table(range.part));
-  const Looker looker(resident_, part, chart, options_);
+  const Looker looker(resident_, part, charts_.of(range.part), options_);
   const auto loaded = [](float(&values)[3][Entries::kLength], std::uint32_t i)
                           HWY_ATTR { return load3(values[0], values[1], values[2], i); };
   const auto store = [](const V3& v, float(&values)[3][Entries::kLength], std::uint32_t i) HWY_ATTR {

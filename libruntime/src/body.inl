@@ -54,17 +54,18 @@ class BlockWalker {
         touching = hn::Or(touching, touches);
         open = hn::AndNot(touches, open);
       }
-      const auto count = static_cast<std::uint32_t>(hn::CountTrue(kD, touching));
-      if (count == 0) continue;
+      if (none(touching)) continue;
+      const Packing packed(touching);
+      const std::uint32_t count = packed.count();
       if (chunk.block_count + count > kChunkBlocks) return true;
       HWY_ALIGN float values[4][kMostLanes];
       HWY_ALIGN std::int32_t firsts[kMostLanes];
-      hn::Store(hn::Compress(centre.x, touching), kD, values[0]);
-      hn::Store(hn::Compress(centre.y, touching), kD, values[1]);
-      hn::Store(hn::Compress(centre.z, touching), kD, values[2]);
-      hn::Store(hn::Compress(radius, touching), kD, values[3]);
+      hn::Store(packed(centre.x), kD, values[0]);
+      hn::Store(packed(centre.y), kD, values[1]);
+      hn::Store(packed(centre.z), kD, values[2]);
+      hn::Store(packed(radius), kD, values[3]);
       const VI block = hn::Iota(kDI, static_cast<std::int32_t>(next_));
-      hn::Store(hn::Compress(block, hn::RebindMask(kDI, touching)), kDI, firsts);
+      hn::Store(packed(block), kDI, firsts);
       for (std::uint32_t k = 0; k < count; ++k) {
         const std::uint32_t slot = chunk.block_count++;
         for (int axis = 0; axis < 3; ++axis) chunk.block_centre[axis][slot] = values[axis][k];

@@ -34,12 +34,13 @@ HWY_INLINE M reaching(const PartRecord& part, const V3& centre, V radius, M want
 
 /// Appends the lanes of mask.
 HWY_INLINE void append(M mask, const V3& p, VI point, Entries& out) {
-  // Compress and a whole store: a compressing store is microcode on some processors.
-  hn::StoreU(hn::Compress(p.x, mask), kD, out.x + out.count);
-  hn::StoreU(hn::Compress(p.y, mask), kD, out.y + out.count);
-  hn::StoreU(hn::Compress(p.z, mask), kD, out.z + out.count);
-  hn::StoreU(hn::Compress(point, hn::RebindMask(kDI, mask)), kDI, out.point + out.count);
-  out.count += static_cast<std::uint32_t>(hn::CountTrue(kD, mask));
+  // A whole store: a compressing store is microcode on some processors.
+  const Packing packed(mask);
+  hn::StoreU(packed(p.x), kD, out.x + out.count);
+  hn::StoreU(packed(p.y), kD, out.y + out.count);
+  hn::StoreU(packed(p.z), kD, out.z + out.count);
+  hn::StoreU(packed(point), kDI, out.point + out.count);
+  out.count += packed.count();
 }
 
 /// Appends the points between the part's planes.

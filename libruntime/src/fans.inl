@@ -21,16 +21,16 @@ HWY_NOINLINE M Walker::set_aside(const Walk& walk, const VCell& cell, VI entry, 
   }
   if (count == first) return hn::Lt(hn::Zero(kD), hn::Zero(kD));
   const M found = hn::Gt(hn::Load(kD, held), hn::Zero(kD));
-  const auto found_int = hn::RebindMask(kDI, found);
-  hn::StoreU(hn::Compress(walk.p.x, found), kD, fans_.x + first);
-  hn::StoreU(hn::Compress(walk.p.y, found), kD, fans_.y + first);
-  hn::StoreU(hn::Compress(walk.p.z, found), kD, fans_.z + first);
-  hn::StoreU(hn::Compress(walk.row, found), kD, fans_.row + first);
-  hn::StoreU(hn::Compress(walk.col, found), kD, fans_.col + first);
-  hn::StoreU(hn::Compress(walk.on_rim, found), kD, fans_.on_rim + first);
-  hn::StoreU(hn::Compress(walk.cell_row, found_int), kDI, fans_.cell_row + first);
-  hn::StoreU(hn::Compress(walk.cell_col, found_int), kDI, fans_.cell_col + first);
-  hn::StoreU(hn::Compress(entry, found_int), kDI, fans_.entry + first);
+  const Packing packed(found);
+  hn::StoreU(packed(walk.p.x), kD, fans_.x + first);
+  hn::StoreU(packed(walk.p.y), kD, fans_.y + first);
+  hn::StoreU(packed(walk.p.z), kD, fans_.z + first);
+  hn::StoreU(packed(walk.row), kD, fans_.row + first);
+  hn::StoreU(packed(walk.col), kD, fans_.col + first);
+  hn::StoreU(packed(walk.on_rim), kD, fans_.on_rim + first);
+  hn::StoreU(packed(walk.cell_row), kDI, fans_.cell_row + first);
+  hn::StoreU(packed(walk.cell_col), kDI, fans_.cell_col + first);
+  hn::StoreU(packed(entry), kDI, fans_.entry + first);
   fans_.count = count;
   return found;
 }

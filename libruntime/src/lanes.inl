@@ -53,6 +53,51 @@ HWY_INLINE std::uint32_t bits_of(M mask) {
   std::memcpy(&bits, bytes, sizeof bits);
   return bits;
 }
+#if HWY_TARGET != HWY_AVX3
+/// The lanes that a mask of eight bits names, ascending, and then the others.
+consteval auto front_orders() {
+  std::array<std::array<std::uint8_t, 8>, 256> orders{};
+  for (unsigned bits = 0; bits < 256; ++bits) {
+    std::size_t place = 0;
+    for (const unsigned wanted : {1U, 0U})
+      for (unsigned lane = 0; lane < 8; ++lane)
+        if ((bits >> lane & 1U) == wanted) orders[bits][place++] = static_cast<std::uint8_t>(lane);
+  }
+  return orders;
+}
+inline constexpr auto kFrontOrders = front_orders();
+#endif
+
+/// Moves the lanes of a mask to the front, in their order: hn::Compress of many vectors by one mask. Highway
+/// 1.0 has that copy a kilobyte to the stack for every vector where the processor has no instruction for it.
+class Packing {
+ public:
+#if HWY_TARGET == HWY_AVX3
+  HWY_INLINE explicit Packing(M mask) : mask_(mask) {}
+  HWY_INLINE std::uint32_t count() const { return static_cast<std::uint32_t>(hn::CountTrue(kD, mask_)); }
+  HWY_INLINE V operator()(V value) const { return hn::Compress(value, mask_); }
+  HWY_INLINE VI operator()(VI value) const { return hn::Compress(value, hn::RebindMask(kDI, mask_)); }
+
+ private:
+  M mask_;
+#else
+  HWY_INLINE explicit Packing(M mask) : bits_(bits_of(mask)) {
+    const hn::Rebind<std::uint8_t, D> bytes;
+    order_ = hn::PromoteTo(kDI, hn::LoadU(bytes, kFrontOrders[bits_].data()));
+  }
+  HWY_INLINE std::uint32_t count() const { return static_cast<std::uint32_t>(std::popcount(bits_)); }
+  HWY_INLINE V operator()(V value) const {
+    return hn::TableLookupLanes(value, hn::IndicesFromVec(kD, order_));
+  }
+  HWY_INLINE VI operator()(VI value) const {
+    return hn::TableLookupLanes(value, hn::IndicesFromVec(kDI, order_));
+  }
+
+ private:
+  std::uint32_t bits_;
+  VI order_;
+#endif
+};
 HWY_INLINE V3 all(const Vec3f& a) { return {all(a.x), all(a.y), all(a.z)}; }
 /// 1/|a|, or 0 where |a| is zero.
 HWY_INLINE V inverse_length(const V3& a) {
@@ -109,15 +154,6 @@ SQMAP_KERNEL V3 shape_normal_of(const PartRecord& part, const V3& p) {
   return pick(known, normalized3(n), V3{zero, zero, zero});
 }
 
-/// table[k] for k in [0, 31].
-HWY_INLINE V lookup(const float* table, VI k) {
-  static_assert(CurveTable<float>::kCells == 32);
-#if HWY_TARGET == HWY_AVX3
-  return V{_mm512_permutex2var_ps(_mm512_loadu_ps(table), k.raw, _mm512_loadu_ps(table + 16))};
-#else
-  return hn::GatherIndex(kD, table, k);
-#endif
-}
 /// Four bytes from base + offset, wherever they begin.
 HWY_INLINE VU gather_bytes(const std::uint8_t* base, VI offset) {
 #if HWY_TARGET == HWY_AVX3 || HWY_TARGET == HWY_AVX2
@@ -132,24 +168,96 @@ HWY_INLINE VU gather_bytes(const std::uint8_t* base, VI offset) {
 #endif
 }
 
+/// The cells of a curve, each as two cubics of the place t in it, c and s = k_0 + t (k_1 + t (k_2 + t k_3)).
+/// A vector's lanes lie in as many cells. With AVX-512 each of the eight coefficients is picked from a table
+/// that fits two registers; elsewhere each lane loads its cell, and the cells are transposed: gathers of the
+/// coefficients would take several times as long.
+struct CurveCells {
+  static constexpr int kCells = CurveTable<float>::kCells, kCubics = 4;
+  static constexpr bool kByCoefficient = HWY_TARGET == HWY_AVX3;
+
+  alignas(64) float of[2 * kCubics * kCells];
+
+  void set(const CurveTable<float>& curve) noexcept {
+    for (int k = 0; k < kCells; ++k) {
+      set(k, 0, curve.c[k], curve.c[k + 1], curve.c_step[k], curve.c_step[k + 1]);
+      set(k, kCubics, curve.s[k], curve.s[k + 1], curve.s_step[k], curve.s_step[k + 1]);
+    }
+  }
+
+ private:
+  /// CurveTable::hermite.
+  void set(int cell, int first, float a, float b, float a_step, float b_step) noexcept {
+    const float rise = b - a;
+    const float cubic = (a_step + b_step) - (rise + rise);
+    const float values[kCubics] = {a, a_step, (rise - a_step) - cubic, cubic};
+    for (int i = 0; i < kCubics; ++i)
+      of[kByCoefficient ? (first + i) * kCells + cell : 2 * kCubics * cell + first + i] = values[i];
+  }
+};
+
+/// What queries of one part read of its superquadric.
+struct Tables {
+  ShapeTable<float> shape;
+  CurveCells eta, omega;
+};
+
+/// The coefficients of c (first = 0) or s (4) of the lanes' cells.
+HWY_INLINE void cubics_of(const CurveCells& cells, const std::int32_t* cell, VI k, int first, V (&cubic)[4]) {
+#if HWY_TARGET == HWY_AVX3
+  static_assert(CurveCells::kCells == 32);
+  (void)cell;
+  for (int i = 0; i < 4; ++i) {
+    const float* table = cells.of + (first + i) * CurveCells::kCells;
+    cubic[i] = V{_mm512_permutex2var_ps(_mm512_load_ps(table), k.raw, _mm512_load_ps(table + 16))};
+  }
+#elif HWY_TARGET == HWY_SCALAR
+  (void)k;
+  for (int i = 0; i < 4; ++i) cubic[i] = all(cells.of[8 * cell[0] + first + i]);
+#else
+  (void)k;
+  const auto row = [&](int lane) HWY_ATTR { return cells.of + 8 * cell[lane] + first; };
+  V rows[4];  // of lanes i, i + 4, ..: a block of four each
+  for (int i = 0; i < 4; ++i) {
+#if HWY_TARGET == HWY_AVX2
+    const hn::Half<D> half;
+    rows[i] = hn::Combine(kD, hn::Load(half, row(i + 4)), hn::Load(half, row(i)));
+#else
+    rows[i] = hn::Load(kD, row(i));
+#endif
+  }
+  const hn::Repartition<double, D> pairs;
+  const auto low = hn::BitCast(pairs, hn::InterleaveLower(kD, rows[0], rows[1]));
+  const auto low_next = hn::BitCast(pairs, hn::InterleaveLower(kD, rows[2], rows[3]));
+  const auto high = hn::BitCast(pairs, hn::InterleaveUpper(kD, rows[0], rows[1]));
+  const auto high_next = hn::BitCast(pairs, hn::InterleaveUpper(kD, rows[2], rows[3]));
+  cubic[0] = hn::BitCast(kD, hn::InterleaveLower(pairs, low, low_next));
+  cubic[1] = hn::BitCast(kD, hn::InterleaveUpper(pairs, low, low_next));
+  cubic[2] = hn::BitCast(kD, hn::InterleaveLower(pairs, high, high_next));
+  cubic[3] = hn::BitCast(kD, hn::InterleaveUpper(pairs, high, high_next));
+#endif
+}
+
 struct Place {
   V c, s, c_1, s_1, c_2, s_2;
 };
-HWY_INLINE void hermite(const float* table, const float* steps, VI k, V t, V& value, V& first, V& second) {
-  const V a = lookup(table, k), a_step = lookup(steps, k), b_step = lookup(steps + 1, k);
-  const V rise = lookup(table + 1, k) - a;
-  const V cubic = (a_step + b_step) - (rise + rise);
-  const V square = (rise - a_step) - cubic;
-  value = a + t * (a_step + t * (square + t * cubic));
-  first = a_step + t * ((square + square) + t * (all(3.0F) * cubic));
-  second = (square + square) + t * (all(6.0F) * cubic);
+HWY_INLINE void hermite(const V (&cubic)[4], V t, V& value, V& first, V& second) {
+  const V twice = cubic[2] + cubic[2];
+  value = cubic[0] + t * (cubic[1] + t * (cubic[2] + t * cubic[3]));
+  first = cubic[1] + t * (twice + t * (all(3.0F) * cubic[3]));
+  second = twice + t * (all(6.0F) * cubic[3]);
 }
-SQMAP_KERNEL Place place_at(const CurveTable<float>& curve, V position) {
-  const VI k = hn::Min(hn::Max(to_int(position), hn::Zero(kDI)), hn::Set(kDI, CurveTable<float>::kCells - 1));
+SQMAP_KERNEL Place place_at(const CurveCells& curve, V position) {
+  const VI k = hn::Min(hn::Max(to_int(position), hn::Zero(kDI)), hn::Set(kDI, CurveCells::kCells - 1));
   const V t = position - to_float(k);
+  HWY_ALIGN std::int32_t cell[kMostLanes];
+  if (!CurveCells::kByCoefficient) hn::Store(k, kDI, cell);
+  V cubic[4];
   Place place;
-  hermite(curve.c, curve.c_step, k, t, place.c, place.c_1, place.c_2);
-  hermite(curve.s, curve.s_step, k, t, place.s, place.s_1, place.s_2);
+  cubics_of(curve, cell, k, 0, cubic);
+  hermite(cubic, t, place.c, place.c_1, place.c_2);
+  cubics_of(curve, cell, k, CurveCells::kCubics, cubic);
+  hermite(cubic, t, place.s, place.s_1, place.s_2);
   return place;
 }
 HWY_INLINE V3 gradient(const ShapeTable<float>& table, const Place& e, const Place& o) {
@@ -162,9 +270,10 @@ struct VFoot {
   V row, col, depth, cell;
 };
 
-SQMAP_KERNEL void newton_step(const ShapeTable<float>& table, const V3& m, V& u, V& v) {
+SQMAP_KERNEL void newton_step(const Tables& tables, const V3& m, V& u, V& v) {
   using Table = ShapeTable<float>;
-  const Place e = place_at(table.eta, u), o = place_at(table.omega, v);
+  const Table& table = tables.shape;
+  const Place e = place_at(tables.eta, u), o = place_at(tables.omega, v);
   const V ax = all(table.axes_m.x), ay = all(table.axes_m.y), az = all(table.axes_m.z);
   const V x = ax * o.c, y = ay * o.s, x_1 = ax * o.c_1, y_1 = ay * o.s_1, x_2 = ax * o.c_2, y_2 = ay * o.s_2;
   const V z_1 = az * e.s_1, z_2 = az * e.s_2;
@@ -192,8 +301,9 @@ SQMAP_KERNEL void newton_step(const ShapeTable<float>& table, const V3& m, V& u,
 }
 
 /// ShapeTable::foot.
-SQMAP_KERNEL VFoot foot_of(const ShapeTable<float>& table, const V3& point) {
+SQMAP_KERNEL VFoot foot_of(const Tables& tables, const V3& point) {
   using Table = ShapeTable<float>;
+  const Table& table = tables.shape;
   const V3 m{hn::Abs(point.x), hn::Abs(point.y), hn::Abs(point.z)};
   V along[Table::kScan];
   for (int j = 0; j < Table::kScan; ++j) {
@@ -215,9 +325,9 @@ SQMAP_KERNEL VFoot foot_of(const ShapeTable<float>& table, const V3& point) {
     v = pick(better, row_v, v);
     greatest = most(here, greatest);
   }
-  for (int step = 0; step < Table::kNewtonSteps; ++step) newton_step(table, m, u, v);
+  for (int step = 0; step < Table::kNewtonSteps; ++step) newton_step(tables, m, u, v);
 
-  const Place e = place_at(table.eta, u), o = place_at(table.omega, v);
+  const Place e = place_at(tables.eta, u), o = place_at(tables.omega, v);
   const V ax = all(table.axes_m.x), ay = all(table.axes_m.y), az = all(table.axes_m.z);
   const V x = ax * o.c, y = ay * o.s;
   const V dx = x * e.c - m.x, dy = y * e.c - m.y, dz = az * e.s - m.z;
@@ -243,11 +353,12 @@ struct Sample {
 };
 
 /// ShapeTable::sample.
-SQMAP_KERNEL Sample sample_at(const ShapeTable<float>& table, V row, V col) {
+SQMAP_KERNEL Sample sample_at(const Tables& tables, V row, V col) {
+  const ShapeTable<float>& table = tables.shape;
   const V zero = hn::Zero(kD), one = all(1.0F), minus = all(-1.0F);
   const V up = row - all(table.half_rows);
   const V z_sign = pick(hn::Lt(up, zero), minus, one);
-  const Place e = place_at(table.eta, hn::Abs(up) * all(table.eta_per_row));
+  const Place e = place_at(tables.eta, hn::Abs(up) * all(table.eta_per_row));
 
   const V turn = all(4.0F * table.quarter_cols), half_turn = all(2.0F * table.quarter_cols);
   const V raised = pick(hn::Lt(col, zero), col + turn, col);
@@ -257,7 +368,7 @@ SQMAP_KERNEL Sample sample_at(const ShapeTable<float>& table, V row, V col) {
   const V along = hn::Abs(around);
   const M beyond = hn::Gt(along, all(table.quarter_cols));
   const V x_sign = pick(beyond, minus, one);
-  const Place o = place_at(table.omega, pick(beyond, half_turn - along, along) * all(table.omega_per_col));
+  const Place o = place_at(tables.omega, pick(beyond, half_turn - along, along) * all(table.omega_per_col));
 
   const V row_scale = z_sign * all(table.eta_per_row),
           col_scale = (x_sign * y_sign) * all(table.omega_per_col);

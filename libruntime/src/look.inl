@@ -25,11 +25,11 @@ struct VPatch {
 /// One part at one layer and level, with what every step of a look needs of it.
 class Looker {
  public:
-  Looker(const Resident& resident, const PartRecord& part, const Chart& chart,
+  Looker(const Resident& resident, const PartRecord& part, const Tables& tables,
          const QueryOptions& options) noexcept
       : resident_(resident),
         part_(part),
-        chart_(chart),
+        tables_(tables),
         stride_(part.stride_at(options.level)),
         third_(layer_for(part, options) == Layer::kThree),
         last_row_(static_cast<float>(part.rows - 1)),
@@ -41,20 +41,18 @@ class Looker {
   SQMAP_KERNEL Look look(const V3& p, M wanted, float reach) const noexcept;
   /// Where layer 2 says the surface is, and its normal there.
   HWY_INLINE V3 surface_at(V row, V col, V crossing) const noexcept {
-    const Sample r = sample_at(chart_.table(), row, col);
+    const Sample r = sample_at(tables_, row, col);
     return r.point - crossing * r.normal;
   }
   HWY_INLINE V3 normal_at(V row, V col, M leaving, M on_patch) const noexcept {
     VCell cell = cell_at(row, col);
     read(cell);
-    const V3 normal =
-        pick(on_patch, patch_normal(cell, row, col), sample_at(chart_.table(), row, col).normal);
+    const V3 normal = pick(on_patch, patch_normal(cell, row, col), sample_at(tables_, row, col).normal);
     return pick(leaving, all(-1.0F), all(1.0F)) * normal;
   }
   /// Of what Resident::start names.
   HWY_INLINE V start_row(VI start) const noexcept { return start_place(hn::ShiftRight<8>(start)); }
   HWY_INLINE V start_col(VI start) const noexcept { return start_place(hn::And(start, all_int(255))); }
-  const Chart& chart() const noexcept { return chart_; }
 
   // What Walker builds on.
 
@@ -121,7 +119,7 @@ class Looker {
     const V depth = low + s * (high - low);
     const V depth_row = (high - low) * inverse;
     const V depth_col = (rise_low + s * (rise_high - rise_low)) * inverse;
-    const Sample r = sample_at(chart_.table(), row, col);
+    const Sample r = sample_at(tables_, row, col);
     return {r.point - depth * r.normal, r.point_row - depth_row * r.normal - depth * r.normal_row,
             r.point_col - depth_col * r.normal - depth * r.normal_col};
   }
@@ -171,7 +169,7 @@ class Looker {
 
   const Resident& resident_;
   const PartRecord& part_;
-  const Chart& chart_;
+  const Tables& tables_;
   std::uint32_t stride_;
   bool third_;
   float last_row_, turn_, size_, inverse_size_;
@@ -205,7 +203,7 @@ SQMAP_KERNEL V Looker::offset(V row, V col, float edge) const noexcept {
 }
 
 SQMAP_KERNEL Look Looker::look(const V3& p, M wanted, float reach) const noexcept {
-  const VFoot foot = foot_of(chart_.table(), p);
+  const VFoot foot = foot_of(tables_, p);
   const V zero = hn::Zero(kD), one = all(1.0F), half = all(0.5F);
   VCell cell = cell_at(foot.row, foot.col);
   const Corners corners = read(cell);

@@ -42,8 +42,9 @@ struct alignas(64) EntryList {
 
   HWY_INLINE void append(VI entries, M lanes) noexcept {
     if (none(lanes)) return;
-    hn::StoreU(hn::Compress(entries, hn::RebindMask(kDI, lanes)), kDI, entry + count);
-    count += static_cast<std::uint32_t>(hn::CountTrue(kD, lanes));
+    const Packing packed(lanes);
+    hn::StoreU(packed(entries), kDI, entry + count);
+    count += packed.count();
   }
 };
 
@@ -222,13 +223,12 @@ HWY_NOINLINE void Walker::keep(Walk& walk, VI entry, M lanes) noexcept {
   V* fields[kWalkFields];
   fields_of(walk, fields);
   const std::uint32_t at = pending_.count;
-  for (int k = 0; k < kWalkFields; ++k)
-    hn::StoreU(hn::Compress(*fields[k], lanes), kD, pending_.values[k] + at);
-  const auto mask = hn::RebindMask(kDI, lanes);
-  hn::StoreU(hn::Compress(walk.cell_row, mask), kDI, pending_.cell_row + at);
-  hn::StoreU(hn::Compress(walk.cell_col, mask), kDI, pending_.cell_col + at);
-  hn::StoreU(hn::Compress(entry, mask), kDI, pending_.entry + at);
-  pending_.count += static_cast<std::uint32_t>(hn::CountTrue(kD, lanes));
+  const Packing packed(lanes);
+  for (int k = 0; k < kWalkFields; ++k) hn::StoreU(packed(*fields[k]), kD, pending_.values[k] + at);
+  hn::StoreU(packed(walk.cell_row), kDI, pending_.cell_row + at);
+  hn::StoreU(packed(walk.cell_col), kDI, pending_.cell_col + at);
+  hn::StoreU(packed(entry), kDI, pending_.entry + at);
+  pending_.count += packed.count();
 }
 
 HWY_NOINLINE void Walker::go_on() noexcept {
