@@ -1,6 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "grid_kernels.hpp"
 
+#include <array>
+#include <bit>
+#include <cstring>
+
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "grid_kernels.cpp"
 #include <hwy/foreach_target.h>
@@ -11,6 +15,8 @@ namespace sqmap::bench::HWY_NAMESPACE {
 namespace {
 
 namespace hn = hwy::HWY_NAMESPACE;
+#include "packing.inl"
+
 using DF = hn::ScalableTag<float>;
 using DI = hn::RebindToSigned<DF>;
 using VF = hn::Vec<DF>;
@@ -144,15 +150,16 @@ HWY_INLINE void store(MF near, std::size_t first, VF distance_m, const Sample& s
       hn::Mul(hn::Set(kFloats, kStiffness_n_per_m), hn::Max(hn::Zero(kFloats), hn::Neg(distance_m)));
   const std::size_t at = hits.count;
   const VI index = hn::Iota(kInts, static_cast<std::int32_t>(first));
-  hits.count += hn::CompressStore(index, hn::RebindMask(kInts, near), kInts,
-                                  reinterpret_cast<std::int32_t*>(hits.point.data() + at));
-  hn::CompressStore(distance_m, near, kFloats, hits.distance_m.data() + at);
-  hn::CompressStore(nx, near, kFloats, hits.normal_x.data() + at);
-  hn::CompressStore(ny, near, kFloats, hits.normal_y.data() + at);
-  hn::CompressStore(nz, near, kFloats, hits.normal_z.data() + at);
-  hn::CompressStore(hn::Mul(push, nx), near, kFloats, hits.force_x_n.data() + at);
-  hn::CompressStore(hn::Mul(push, ny), near, kFloats, hits.force_y_n.data() + at);
-  hn::CompressStore(hn::Mul(push, nz), near, kFloats, hits.force_z_n.data() + at);
+  const Packing packed(near);
+  hits.count += packed.count();
+  hn::StoreU(packed(index), kInts, reinterpret_cast<std::int32_t*>(hits.point.data() + at));
+  hn::StoreU(packed(distance_m), kFloats, hits.distance_m.data() + at);
+  hn::StoreU(packed(nx), kFloats, hits.normal_x.data() + at);
+  hn::StoreU(packed(ny), kFloats, hits.normal_y.data() + at);
+  hn::StoreU(packed(nz), kFloats, hits.normal_z.data() + at);
+  hn::StoreU(packed(hn::Mul(push, nx)), kFloats, hits.force_x_n.data() + at);
+  hn::StoreU(packed(hn::Mul(push, ny)), kFloats, hits.force_y_n.data() + at);
+  hn::StoreU(packed(hn::Mul(push, nz)), kFloats, hits.force_z_n.data() + at);
 }
 
 /// The points [begin, end); `end` may exceed the cloud by its padding.
@@ -255,8 +262,10 @@ std::size_t near_blocks(const NearView& view, const Cloud& cloud, const Placemen
     keep = hn::And(keep, hn::Le(hn::Mul(gap_m, hn::ConvertTo(kFloats, gap)), hn::Add(radius_m, off_m)));
     if (b + hn::Lanes(kFloats) > cloud.block_count)
       keep = hn::And(keep, hn::FirstN(kFloats, cloud.block_count - b));
-    count += hn::CompressStore(hn::Iota(kInts, static_cast<std::int32_t>(b)), hn::RebindMask(kInts, keep),
-                               kInts, reinterpret_cast<std::int32_t*>(blocks + count));
+    const Packing packed(keep);
+    hn::StoreU(packed(hn::Iota(kInts, static_cast<std::int32_t>(b))), kInts,
+               reinterpret_cast<std::int32_t*>(blocks + count));
+    count += packed.count();
   }
   return count;
 }

@@ -46,6 +46,8 @@
 HWY_BEFORE_NAMESPACE();
 namespace sqmap::runtime::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
+#include "packing.inl"
+//
 #include "lanes.inl"
 //
 #include "look.inl"

@@ -53,51 +53,6 @@ HWY_INLINE std::uint32_t bits_of(M mask) {
   std::memcpy(&bits, bytes, sizeof bits);
   return bits;
 }
-#if HWY_TARGET != HWY_AVX3
-/// The lanes that a mask of eight bits names, ascending, and then the others.
-consteval auto front_orders() {
-  std::array<std::array<std::uint8_t, 8>, 256> orders{};
-  for (unsigned bits = 0; bits < 256; ++bits) {
-    std::size_t place = 0;
-    for (const unsigned wanted : {1U, 0U})
-      for (unsigned lane = 0; lane < 8; ++lane)
-        if ((bits >> lane & 1U) == wanted) orders[bits][place++] = static_cast<std::uint8_t>(lane);
-  }
-  return orders;
-}
-inline constexpr auto kFrontOrders = front_orders();
-#endif
-
-/// Moves the lanes of a mask to the front, in their order: hn::Compress of many vectors by one mask. Highway
-/// 1.0 has that copy a kilobyte to the stack for every vector where the processor has no instruction for it.
-class Packing {
- public:
-#if HWY_TARGET == HWY_AVX3
-  HWY_INLINE explicit Packing(M mask) : mask_(mask) {}
-  HWY_INLINE std::uint32_t count() const { return static_cast<std::uint32_t>(hn::CountTrue(kD, mask_)); }
-  HWY_INLINE V operator()(V value) const { return hn::Compress(value, mask_); }
-  HWY_INLINE VI operator()(VI value) const { return hn::Compress(value, hn::RebindMask(kDI, mask_)); }
-
- private:
-  M mask_;
-#else
-  HWY_INLINE explicit Packing(M mask) : bits_(bits_of(mask)) {
-    const hn::Rebind<std::uint8_t, D> bytes;
-    order_ = hn::PromoteTo(kDI, hn::LoadU(bytes, kFrontOrders[bits_].data()));
-  }
-  HWY_INLINE std::uint32_t count() const { return static_cast<std::uint32_t>(std::popcount(bits_)); }
-  HWY_INLINE V operator()(V value) const {
-    return hn::TableLookupLanes(value, hn::IndicesFromVec(kD, order_));
-  }
-  HWY_INLINE VI operator()(VI value) const {
-    return hn::TableLookupLanes(value, hn::IndicesFromVec(kDI, order_));
-  }
-
- private:
-  std::uint32_t bits_;
-  VI order_;
-#endif
-};
 HWY_INLINE V3 all(const Vec3f& a) { return {all(a.x), all(a.y), all(a.z)}; }
 /// 1/|a|, or 0 where |a| is zero.
 HWY_INLINE V inverse_length(const V3& a) {
