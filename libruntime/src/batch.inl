@@ -273,12 +273,13 @@ HWY_NOINLINE void Answerer::place(const EntryRange& range) noexcept {
     if (none(wanted)) continue;
     const M refined = has(kRefined);
     V3 surface = loaded(entries_.surface, i), normal = loaded(entries_.normal, i);
-    if (!none(hn::AndNot(refined, wanted))) {
+    const M rough = hn::AndNot(refined, wanted);
+    if (!none(rough)) {
       const V row = hn::LoadU(kD, entries_.row + i), col = hn::LoadU(kD, entries_.col + i);
       if (wants_.surface)
         surface = pick(refined, surface, looker.surface_at(row, col, hn::LoadU(kD, entries_.crossing + i)));
       if (wants_.normal)
-        normal = pick(refined, normal, looker.normal_at(row, col, has(kLeaving), has(kPatch)));
+        normal = pick(refined, normal, looker.normal_at(rough, row, col, has(kLeaving), has(kPatch)));
     }
     if (wants_.surface)
       store(rotated(part.object_from_part, surface) + all(part.translation), entries_.surface, i);

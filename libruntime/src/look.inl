@@ -44,10 +44,12 @@ class Looker {
     const Sample r = sample_at(tables_, row, col);
     return r.point - crossing * r.normal;
   }
-  HWY_INLINE V3 normal_at(V row, V col, M leaving, M on_patch) const noexcept {
+  HWY_INLINE V3 normal_at(M lanes, V row, V col, M leaving, M on_patch) const noexcept {
     VCell cell = cell_at(row, col);
     read(cell);
-    const V3 normal = pick(on_patch, patch_normal(cell, row, col), sample_at(tables_, row, col).normal);
+    V3 normal = patch_normal(cell, row, col);
+    if (!none(hn::AndNot(on_patch, lanes)))
+      normal = pick(on_patch, normal, sample_at(tables_, row, col).normal);
     return pick(leaving, all(-1.0F), all(1.0F)) * normal;
   }
   /// Of what Resident::start names.
