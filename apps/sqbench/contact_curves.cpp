@@ -37,13 +37,13 @@ void add_curves(const char* figure, const Model& model, const std::vector<Contes
                 const std::vector<double>& x, std::size_t repetitions, Results& results) {
   std::vector<CurveRow> rows;
   for (const Contestant& contestant : contestants)
-    rows.push_back({figure, model.name, contestant.name, x, {}});
+    rows.push_back({figure, model.name, contestant.name, {}, {}});
   for (std::size_t pose = 0; pose < x.size(); ++pose) {
     std::vector<Contestant> here;
     for (const Contestant& contestant : contestants)
       here.push_back({contestant.name, [&, pose](std::size_t) { return contestant.run(pose); }});
     const std::vector<Timing> timings = measure(here, 1, repetitions);
-    for (std::size_t c = 0; c < rows.size(); ++c) rows[c].y.push_back(timings[c].spread(1e6).median);
+    for (std::size_t c = 0; c < rows.size(); ++c) rows[c].add(x[pose], timings[c].spread(1e6));
   }
   for (CurveRow& row : rows) results.curves.push_back(std::move(row));
 }

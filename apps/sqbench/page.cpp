@@ -45,6 +45,8 @@ class Table {
 
 bool is_ours(const std::string& peer) { return peer.starts_with("sqmap"); }
 
+std::string quartiles(const Spread& spread) { return number(spread.lower) + " - " + number(spread.upper); }
+
 std::string sentence(const std::string& words) { return "<p>" + escaped(words) + "</p>\n"; }
 
 /// Per work, each of our layers against whoever is fastest, model by model.
@@ -181,6 +183,33 @@ std::string accuracy_words(const Results& results) {
   return words;
 }
 
+/// "3", or "2 to 5".
+std::string least_to_most(const std::set<std::size_t>& counts) {
+  return *counts.begin() == *counts.rbegin() ? fmt::to_string(*counts.begin())
+                                             : fmt::format("{} to {}", *counts.begin(), *counts.rbegin());
+}
+
+/// How far apart the quartiles of the curves of times lie, which as bands are hard to read off.
+std::string curve_words(const Results& results) {
+  std::map<std::string, std::vector<double>> widths_percent;  // by figure
+  std::set<std::size_t> counts;
+  for (const CurveRow& row : results.curves)
+    for (const Spread& spread : row.y_spread) {
+      widths_percent[row.figure].push_back(100 * (spread.upper - spread.lower) / spread.median);
+      counts.insert(spread.count);
+    }
+  if (counts.empty()) return {};
+  std::string words;
+  for (const auto& [figure, widths] : widths_percent)
+    words += fmt::format("{}{} {:.2g} and {:.2g}", words.empty() ? "" : ", ", figure,
+                         spread_of(widths).median, *std::max_element(widths.begin(), widths.end()));
+  return sentence(
+      fmt::format("Points of the curves of times are medians of {} repetitions. Their quartiles lie so many "
+                  "percent of the "
+                  "median apart, in the middle and at most: {}.",
+                  least_to_most(counts), words));
+}
+
 /// Its ratio to itself is one in every repetition.
 std::string reference_of(const Results& results) {
   for (const FrameRow& row : results.frames)
@@ -205,25 +234,24 @@ std::string tables(const Results& results) {
                  "ratio to " + reference_of(results), "quartiles"});
     for (const FrameRow& row : results.frames)
       table.row({row.model, row.peer, row.work, number(row.answers_mean), number(row.us.median),
-                 number(row.us.lower) + " - " + number(row.us.upper), number(row.ratio.median),
-                 number(row.ratio.lower) + " - " + number(row.ratio.upper)},
+                 quartiles(row.us), number(row.ratio.median), quartiles(row.ratio)},
                 is_ours(row.peer));
     html += "<h2>Frames</h2>\n" + table.html();
   }
   if (!results.accuracy.empty()) {
     Table table({"model", "peer", "shell, %", "mean error, %", "95th, %", "wrong side, %", "wrong feet, %",
-                 "normal, deg", "answered in/out, %", "ns a point"});
+                 "normal, deg", "answered in/out, %", "ns a point", "quartiles"});
     for (const AccuracyRow& row : results.accuracy)
       table.row({row.model, row.peer, number(row.shell_percent), number(row.mean_error_percent),
                  number(row.p95_error_percent), number(row.wrong_side_percent),
                  number(row.wrong_feet_percent), number(row.normal_mean_deg),
                  number(row.answered_inside_percent) + " / " + number(row.answered_outside_percent),
-                 number(row.ns.median)},
+                 number(row.ns.median), quartiles(row.ns)},
                 is_ours(row.peer));
     html +=
         "<h2>Accuracy</h2>\n<p>Errors and angles are those of the points that the method answered; the "
         "column before "
-        "the last tells how many of those inside and outside the object that are. The side counts for every "
+        "the times tells how many of those inside and outside the object that are. The side counts for every "
         "point.</p>\n" +
         table.html();
   }
@@ -231,12 +259,12 @@ std::string tables(const Results& results) {
     Table table({"model", "method", "budget, KB", "KB resident", "error, %", "depth error, %",
                  "wrong side, %", "answered, %", "normal, deg", "us a frame", "quartiles"});
     for (const BudgetRow& row : results.budgets)
-      table.row({row.model, row.peer, number(row.budget_bytes / kKilobyte),
-                 number(static_cast<double>(row.bytes) / kKilobyte), number(row.mean_error_percent),
-                 number(row.depth_error_percent), number(row.wrong_side_percent),
-                 number(row.answered_percent), number(row.normal_mean_deg), number(row.us.median),
-                 number(row.us.lower) + " - " + number(row.us.upper)},
-                is_ours(row.peer));
+      table.row(
+          {row.model, row.peer, number(row.budget_bytes / kKilobyte),
+           number(static_cast<double>(row.bytes) / kKilobyte), number(row.mean_error_percent),
+           number(row.depth_error_percent), number(row.wrong_side_percent), number(row.answered_percent),
+           number(row.normal_mean_deg), number(row.us.median), quartiles(row.us)},
+          is_ours(row.peer));
     html +=
         "<h2>Budgets</h2>\n<p>Of each method the finest setting that fits; sqmap is baked for each budget. "
         "Errors and angles of the answered points within 1 % of R_max of the surface; the error of the depth "
@@ -294,9 +322,7 @@ std::string tables(const Results& results) {
   if (!results.effects.empty()) {
     Table table({"model", "asked for", "us a frame", "quartiles"});
     for (const EffectRow& row : results.effects)
-      table.row({row.model, row.variant, number(row.us.median),
-                 number(row.us.lower) + " - " + number(row.us.upper)},
-                true);
+      table.row({row.model, row.variant, number(row.us.median), quartiles(row.us)}, true);
     html += "<h2>What is asked for</h2>\n" + table.html();
   }
   if (!results.checks.empty()) {
@@ -339,6 +365,7 @@ std::string results_page(const Results& results, const std::vector<Picture>& pic
       "thread, medians; in each repetition all methods take turns, and ratios are formed within a "
       "repetition. "
       "What is prepared is timed once, by the clock on the wall. A KB is 1024 bytes.");
+  html += curve_words(results);
   if (!pictures.empty()) html += "<h2>Pictures</h2>\n";
   for (const Picture& picture : pictures) html += "<figure>" + picture.svg + "</figure>\n";
   return html + tables(results) + "</body>\n</html>\n";

@@ -300,7 +300,11 @@ void add_curves(const Results& results, std::vector<Picture>& pictures) {
     for (const CurveRow& row : results.curves) {
       if (row.figure != figure.figure) continue;
       model = row.model;
-      lines.push_back({row.curve, row.x, row.y});
+      Line& line = lines.emplace_back(Line{row.curve, row.x, row.y});
+      for (const Spread& spread : row.y_spread) {
+        line.lower.push_back(spread.lower);
+        line.upper.push_back(spread.upper);
+      }
     }
     if (lines.empty()) continue;
     const std::string title = fmt::format("{} ({})", figure.title, model);

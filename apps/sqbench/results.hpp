@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <limits>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -16,9 +17,12 @@ namespace sqmap::bench {
 
 inline constexpr double kKilobyte = 1024;  ///< of every KB that is shown
 
-/// Median and quartiles of the repetitions.
+/// Median and quartiles of the repetitions. Results of before these were kept for all times tell the median
+/// alone: their quartiles are NaN.
 struct Spread {
-  double median{}, lower{}, upper{};
+  double median{};
+  double lower = std::numeric_limits<double>::quiet_NaN(), upper = lower;
+  std::size_t count{};  ///< of repetitions; 0: not told
 };
 Spread spread_of(std::vector<double> values);
 
@@ -109,6 +113,15 @@ struct CurveRow {
   std::string figure;  ///< "13a": the paper's Fig. 13a; or a word
   std::string model, curve;
   std::vector<double> x, y;  ///< what they are stands in pictures.cpp; equally many
+  /// Of y where that is a time or a rate, as many; otherwise none.
+  std::vector<Spread> y_spread{};
+
+  /// A point that was timed.
+  void add(double at, const Spread& timed) {
+    x.push_back(at);
+    y.push_back(timed.median);
+    y_spread.push_back(timed);
+  }
 };
 /// A check of what was measured. All must hold, or the run ends with an error.
 struct CheckRow {

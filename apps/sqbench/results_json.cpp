@@ -20,12 +20,14 @@ using Json = nlohmann::ordered_json;
 
 constexpr const char* kSchema = "sqmap.bench/1";
 
-// What a row holds, once for writing and for reading: `visit` takes a name and what it names.
+// What a row holds, once for writing and for reading: `visit` takes a name and what it names,
+// `visit.optional` what results of before it was told lack.
 template <class Visit>
 void fields(Spread& s, Visit& visit) {
   visit("median", s.median);
   visit("lower", s.lower);
   visit("upper", s.upper);
+  visit.optional("count", s.count);
 }
 template <class Visit>
 void fields(Machine& m, Visit& visit) {
@@ -151,6 +153,7 @@ void fields(CurveRow& r, Visit& visit) {
   visit("curve", r.curve);
   visit("x", r.x);
   visit("y", r.y);
+  visit.optional("y_spread", r.y_spread);
 }
 template <class Visit>
 void fields(CheckRow& r, Visit& visit) {
@@ -184,11 +187,18 @@ void fields(Results& r, Visit& visit) {
 template <class T>
 constexpr bool kIsPlain = std::is_arithmetic_v<T> || std::is_same_v<T, std::string>;
 
+bool is_told(std::size_t count) { return count > 0; }
+bool is_told(const std::vector<Spread>& spreads) { return !spreads.empty(); }
+
 struct Writer {
   Json json;
   template <class T>
   void operator()(const char* name, T& value) {
     json[name] = written(value);
+  }
+  template <class T>
+  void optional(const char* name, T& value) {
+    if (is_told(value)) (*this)(name, value);
   }
   template <class T>
   static Json written(T& value) {
@@ -214,6 +224,10 @@ struct Reader {
   template <class T>
   void operator()(const char* name, T& value) {
     read(json.at(name), value);
+  }
+  template <class T>
+  void optional(const char* name, T& value) {
+    if (json.contains(name)) (*this)(name, value);
   }
   template <class T>
   static void read(const Json& from, T& value) {
@@ -275,6 +289,14 @@ std::string csv_field(const std::string& text) {
   return quoted + "\"";
 }
 
+/// A line each for the numbers in `value`, with what leads to them joined to `start` by dots.
+void csv_values(const std::string& start, const Json& value, std::string& text) {
+  if (value.is_number() || value.is_boolean()) text += fmt::format("{},{}\n", start, value.dump());
+  if (value.is_structured())
+    for (const auto& [part, inner] : value.items())
+      csv_values(fmt::format("{}.{}", start, part), inner, text);
+}
+
 void csv_lines(const std::string& table, const Json& row, std::string& text) {
   const auto name = [&](const char* key) {
     return row.contains(key) ? csv_field(row[key].get<std::string>()) : std::string();
@@ -290,15 +312,8 @@ void csv_lines(const std::string& table, const Json& row, std::string& text) {
   if (row.contains("budget_bytes")) work = fmt::format("{} bytes", row["budget_bytes"].get<double>());
   if (row.contains("target_percent") && row["target_percent"].is_number())
     work = fmt::format("target {} %", row["target_percent"].get<double>());
-  const auto line = [&](const std::string& quantity, const Json& value) {
-    if (value.is_number() || value.is_boolean())
-      text += fmt::format("{},{},{},{},{},{}\n", table, name("model"), work, peer, quantity, value.dump());
-  };
-  for (const auto& [key, value] : row.items()) {
-    if (!value.is_structured()) line(key, value);
-    if (value.is_structured())
-      for (const auto& [part, number] : value.items()) line(fmt::format("{}.{}", key, part), number);
-  }
+  const std::string start = fmt::format("{},{},{},{},", table, name("model"), work, peer);
+  for (const auto& [key, value] : row.items()) csv_values(start + key, value, text);
 }
 
 }  // namespace

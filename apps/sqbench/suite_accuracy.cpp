@@ -195,9 +195,8 @@ void run_performance(const SuiteInput& input, const Model& model, Results& resul
   const std::vector<Timing> timings = measure(contestants, 1, input.is_smoke ? 3 : 11);
   for (std::size_t i = 0; i < peers.size(); ++i) {
     auto& [at, peer] = peers[i];
-    CurveRow& row = rows[at];
-    row.x.push_back(compare(model, {{}, std::move(peer)}, shell, cloud, hits).mean_error_percent);
-    row.y.push_back(static_cast<double>(cloud.count) / timings[i].spread(1e6).median);
+    rows[at].add(compare(model, {{}, std::move(peer)}, shell, cloud, hits).mean_error_percent,
+                 timings[i].rate(1e-6 * static_cast<double>(cloud.count)));
   }
   for (CurveRow& row : rows) results.curves.push_back(std::move(row));
 }

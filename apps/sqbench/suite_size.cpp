@@ -59,12 +59,11 @@ double seconds_since(std::chrono::steady_clock::time_point start) {
 class Curves {
  public:
   Curves(std::string figure, std::string model) : figure_(std::move(figure)), model_(std::move(model)) {}
-  void add(const std::string& curve, double x, double y) {
+  void add(const std::string& curve, double x, const Spread& time) {
     auto it =
         std::find_if(rows_.begin(), rows_.end(), [&](const CurveRow& row) { return row.curve == curve; });
     if (it == rows_.end()) it = rows_.insert(it, {figure_, model_, curve, {}, {}});
-    it->x.push_back(x);
-    it->y.push_back(y);
+    it->add(x, time);
   }
   void move_to(Results& results) {
     for (CurveRow& row : rows_) results.curves.push_back(std::move(row));
@@ -86,7 +85,7 @@ void run_objects(const SuiteInput& input, Results& results) {
     if (input.is_smoke) options.max_error_percent = 1, options.sample_count = 2000;
     auto start = std::chrono::steady_clock::now();
     const Model model = baked_model("wavy ball", mesh, options);
-    builds.add("sqmap: bake", faces, seconds_since(start));
+    builds.add("sqmap: bake", faces, spread_of({seconds_since(start)}));
     const Probe probe = scaled_probe(input.probe, model);
     const Sequence sequence = make_sequence(model, probe, Contact::kTouching, input.is_smoke ? 2 : 6);
 
@@ -95,7 +94,7 @@ void run_objects(const SuiteInput& input, Results& results) {
       start = std::chrono::steady_clock::now();
       peers.emplace_back(name, build());
       const double seconds = seconds_since(start) + peers.back().second->field_s();
-      if (!name.starts_with("sqmap")) builds.add(name, faces, seconds);
+      if (!name.starts_with("sqmap")) builds.add(name, faces, spread_of({seconds}));
     };
     add("sqmap-layer2", [&] { return make_sqmap(model, 2, 0); });
     add("sqmap-layer3", [&] { return make_sqmap(model, 3, 0); });
@@ -104,7 +103,7 @@ void run_objects(const SuiteInput& input, Results& results) {
     add("embree-closest", [&] { return make_embree(model); });
     start = std::chrono::steady_clock::now();
     const auto tree = make_fcl(model, probe.mesh, FclTree::kObb, false);
-    builds.add(kTreeReference, faces, seconds_since(start));
+    builds.add(kTreeReference, faces, spread_of({seconds_since(start)}));
 
     Hits hits(probe.cloud.count);
     std::vector<Contestant> contestants;
@@ -118,7 +117,7 @@ void run_objects(const SuiteInput& input, Results& results) {
     const std::vector<Timing> timings =
         measure(contestants, sequence.object_from_probe.size(), input.is_smoke ? 3 : 9);
     for (std::size_t i = 0; i < contestants.size(); ++i)
-      frames.add(contestants[i].name, faces, timings[i].spread(1e6).median);
+      frames.add(contestants[i].name, faces, timings[i].spread(1e6));
   }
   frames.move_to(results);
   builds.move_to(results);
@@ -172,7 +171,7 @@ void run_probes(const SuiteInput& input, const Model& model, Results& results) {
                                                 : count > 10000 ? 5
                                                                 : 9);
     for (std::size_t i = 0; i < contestants.size(); ++i)
-      frames.add(contestants[i].name, static_cast<double>(count), timings[i].spread(1e6).median);
+      frames.add(contestants[i].name, static_cast<double>(count), timings[i].spread(1e6));
   }
   frames.move_to(results);
 }

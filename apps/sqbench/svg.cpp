@@ -213,7 +213,7 @@ std::string frame_of(const Axis& x, const Axis& y, const std::string& x_title, c
 
 bool is_drawn(const Line& line, std::size_t i, bool is_logarithmic) {
   return std::isfinite(line.x[i]) && std::isfinite(line.y[i]) &&
-         (!is_logarithmic || (line.x[i] > 0 && line.y[i] > 0));
+         (!is_logarithmic || (line.x[i] > 0 && line.y[i] > 0 && (line.lower.empty() || line.lower[i] > 0)));
 }
 
 struct Bounds {
@@ -228,8 +228,8 @@ Bounds bounds_of(const std::vector<Line>& lines, bool is_logarithmic) {
       if (!is_drawn(line, i, is_logarithmic)) continue;
       b.x_low = std::min(b.x_low, line.x[i]);
       b.x_high = std::max(b.x_high, line.x[i]);
-      b.y_low = std::min(b.y_low, line.y[i]);
-      b.y_high = std::max(b.y_high, line.y[i]);
+      b.y_low = std::min(b.y_low, line.lower.empty() ? line.y[i] : line.lower[i]);
+      b.y_high = std::max(b.y_high, line.upper.empty() ? line.y[i] : line.upper[i]);
     }
   if (!is_logarithmic && b.y_low < 0.5 * b.y_high) b.y_low = std::min(b.y_low, 0.0);
   return b;
@@ -245,6 +245,19 @@ std::string path_of(const Line& line, const Axis& x, const Axis& y, bool is_loga
     is_down = is_here;
   }
   return fmt::format("<path d=\"{}\" fill=\"none\" stroke=\"{}\" stroke-width=\"1.4\"/>\n", path, colour);
+}
+
+/// From the lower bounds of the points that are drawn, in their order, back along the upper ones.
+std::string band_of(const Line& line, const Axis& x, const Axis& y, bool is_logarithmic, const char* colour) {
+  std::string there, back;
+  for (std::size_t i = 0; i < line.lower.size(); ++i) {
+    if (!is_drawn(line, i, is_logarithmic)) continue;
+    there += fmt::format("{:.1f},{:.1f} ", x.at(line.x[i]), y.at(line.lower[i]));
+    back.insert(0, fmt::format("{:.1f},{:.1f} ", x.at(line.x[i]), y.at(line.upper[i])));
+  }
+  if (there.empty()) return {};
+  return fmt::format("<polygon points=\"{0}{1}\" fill=\"{2}\" stroke=\"{2}\" opacity=\"0.25\"/>\n", there,
+                     back, colour);
 }
 
 double disc_radius(double bytes) { return 2 + 0.8 * std::log2(std::max(bytes, 1024.0) / 1024); }
@@ -330,6 +343,8 @@ std::string lines_svg(const std::string& title, const std::string& x_title, cons
   svg += frame_of(x, y, x_title, y_title);
   double legend = kTop + 12;
   const std::vector<const char*> colours = colours_of(lines);
+  for (std::size_t l = 0; l < lines.size(); ++l)  // below all lines
+    svg += band_of(lines[l], x, y, is_logarithmic, colours[l]);
   for (std::size_t l = 0; l < lines.size(); ++l) {
     const Line& line = lines[l];
     const char* colour = colours[l];
@@ -339,13 +354,16 @@ std::string lines_svg(const std::string& title, const std::string& x_title, cons
         if (is_drawn(line, i, is_logarithmic))
           svg += fmt::format(
               "<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"3\" fill=\"{}\"><title>{}: {:.4g}, "
-              "{:.4g}</title></circle>\n",
-              x.at(line.x[i]), y.at(line.y[i]), colour, escaped(line.name), line.x[i], line.y[i]);
+              "{:.4g}{}</title></circle>\n",
+              x.at(line.x[i]), y.at(line.y[i]), colour, escaped(line.name), line.x[i], line.y[i],
+              line.lower.empty() ? "" : fmt::format(" ({:.4g} to {:.4g})", line.lower[i], line.upper[i]));
     svg += fmt::format("<rect x=\"{}\" y=\"{}\" width=\"16\" height=\"4\" fill=\"{}\"/>\n", kRight + 14,
                        legend - 6, colour);
     svg += text(kRight + 36, legend, "start", line.name, weight_of(line.name));
     legend += 20;
   }
+  if (std::any_of(lines.begin(), lines.end(), [](const Line& line) { return !line.lower.empty(); }))
+    svg += text(kRight + 36, legend, "start", "band: quartiles");
   return svg + "</svg>\n";
 }
 

@@ -22,7 +22,8 @@ std::string scatter_svg(const std::string& title, const std::string& x_title, co
 /// Points joined in their order.
 struct Line {
   std::string name;
-  std::vector<double> x, y;  ///< equally many; a NaN breaks the line
+  std::vector<double> x, y;              ///< equally many; a NaN breaks the line
+  std::vector<double> lower{}, upper{};  ///< quartiles of y, a band around the line; as many, or none
 };
 /// `is_logarithmic`: both axes; only positive values are drawn then.
 std::string lines_svg(const std::string& title, const std::string& x_title, const std::string& y_title,

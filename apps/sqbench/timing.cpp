@@ -22,7 +22,7 @@ double thread_s() {
 
 Spread spread_of(std::vector<double> values) {
   constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
-  if (values.empty()) return {kNan, kNan, kNan};
+  if (values.empty()) return {kNan, kNan, kNan, 0};
   std::sort(values.begin(), values.end());
   const auto at = [&](double share) {  // linear between order statistics
     const double place = share * static_cast<double>(values.size() - 1);
@@ -30,12 +30,18 @@ Spread spread_of(std::vector<double> values) {
     const std::size_t high = std::min(low + 1, values.size() - 1);
     return values[low] + (place - static_cast<double>(low)) * (values[high] - values[low]);
   };
-  return {at(0.5), at(0.25), at(0.75)};
+  return {at(0.5), at(0.25), at(0.75), values.size()};
 }
 
 Spread Timing::spread(double units_per_second) const {
   std::vector<double> values = seconds;
   for (double& value : values) value *= units_per_second;
+  return spread_of(std::move(values));
+}
+
+Spread Timing::rate(double things) const {
+  std::vector<double> values = seconds;
+  for (double& value : values) value = things / value;
   return spread_of(std::move(values));
 }
 

@@ -20,6 +20,8 @@ struct Timing {
   std::vector<double> seconds;  ///< of processor time, an item, by repetition
   double answers_mean{};
   Spread spread(double units_per_second) const;
+  /// Of its inverse: how many of `things` are done in a second, where an item is so many.
+  Spread rate(double things) const;
   /// This over that, repetition by repetition.
   Spread ratio_to(const Timing& other) const;
 };

@@ -45,6 +45,7 @@ Promise.all(figures.map(svg => new Promise((done, failed) => {
 </script>"""
 COMPARE = ROOT / "scripts" / "bench_compare"
 TABLE = ROOT / "scripts" / "bench_table"
+TIMED_FIGURES = {"14a", "14b", "14c", "objects", "objects-build", "probes"}
 TYPES = {"object": dict, "array": list, "string": str, "boolean": bool, "null": type(None)}
 
 
@@ -80,6 +81,25 @@ def violations(value, schema, root, where="$"):
                 yield from violations(item, schema["properties"][name], root, f"{where}.{name}")
             else:
                 yield f"{where}: {name} is not in the schema"
+
+
+def spreads_in(value):
+    """All medians with their quartiles, however deep."""
+    if isinstance(value, dict) and "median" in value:
+        yield value
+    elif isinstance(value, (dict, list)):
+        for item in value.values() if isinstance(value, dict) else value:
+            yield from spreads_in(item)
+
+
+def without_spreads_of_curves(results):
+    """As results were before these and the counts of repetitions were kept."""
+    older = json.loads(json.dumps(results))
+    for spread in spreads_in(older):
+        del spread["count"]
+    for row in older["curves"]:
+        row.pop("y_spread", None)
+    return older
 
 
 class SmokeRun(FolderTest):
@@ -301,11 +321,29 @@ class Smoke(SmokeRun):
             work = self.rows("works", model=row["model"], work=row["work"])[0]
             self.assertAlmostEqual(row["answers_mean"], work["near_mean"], delta=0.5)
 
-    def test_reference_has_ratio_one_and_spreads_are_ordered(self):
+    def test_every_time_has_ordered_quartiles_and_says_of_how_many_repetitions(self):
+        for table, fields in (("frames", ("us", "ratio")), ("accuracy", ("ns",)), ("budgets", ("us",)), ("effects", ("us",))):
+            for row in self.results[table]:
+                for field in fields:
+                    self.assertEqual(row[field]["count"], 3, row)
+        for spread in spreads_in(self.results):
+            self.assertTrue(0 < spread["lower"] <= spread["median"] <= spread["upper"], spread)
+
+    def test_every_point_of_a_curve_of_times_has_a_spread_and_no_other(self):
+        timed = {row["figure"] for row in self.results["curves"] if "y_spread" in row}
+        self.assertEqual(timed, TIMED_FIGURES)
+        for row in self.results["curves"]:
+            if row["figure"] not in timed:
+                continue
+            self.assertEqual([spread["median"] for spread in row["y_spread"]], row["y"])
+            self.assertEqual({spread["count"] for spread in row["y_spread"]}, {1 if row["figure"] == "objects-build" else 3})
+        # Repetitions of a time are never all the same.
+        self.assertTrue(any(spread["lower"] < spread["upper"] for spread in spreads_in(self.rows("curves", figure="14a"))))
+
+    def test_reference_has_ratio_one(self):
         for row in self.results["frames"]:
-            self.assertTrue(0 < row["us"]["lower"] <= row["us"]["median"] <= row["us"]["upper"])
             if row["peer"] == "grid-int16-128-simd-culled":
-                self.assertEqual(row["ratio"], {"median": 1, "lower": 1, "upper": 1})
+                self.assertEqual(row["ratio"], {"median": 1, "lower": 1, "upper": 1, "count": 3})
 
     def test_force_over_facets_turns_less_when_shaded_and_least_on_the_map(self):
         for model in ("ball", "brick"):
@@ -385,6 +423,21 @@ class Smoke(SmokeRun):
                 self.assertNotIn("no values", text)
                 self.assertIn(text, self.files["index.html"])
 
+    def test_quartiles_of_a_curve_are_a_band_around_its_line(self):
+        for figure in TIMED_FIGURES:
+            text = self.files[f"fig{figure}.svg" if figure[0] == "1" else f"{figure}.svg"]
+            bands = re.findall(r"<polygon points=\"([^\"]*)\"", text)
+            self.assertEqual(len(bands), len(self.rows("curves", figure=figure)), figure)
+            self.assertIn("band: quartiles", text)
+        row = self.rows("curves", figure="objects")[0]
+        band = re.search(r"<polygon points=\"([^\"]*)\"", self.files["objects.svg"]).group(1).split()
+        line = re.findall(r"[ML]([\d.]+) ([\d.]+)", re.search(r"<path d=\"[^\"]*\"", self.files["objects.svg"]).group())
+        self.assertEqual(len(band), 2 * len(row["x"]))
+        for (x, y), low, high in zip(line, band, reversed(band)):
+            self.assertEqual((x, x), (low.split(",")[0], high.split(",")[0]))
+            self.assertTrue(float(low.split(",")[1]) >= float(y) >= float(high.split(",")[1]))  # y is downwards
+        self.assertNotIn("<polygon", self.files["fig13a.svg"])
+
     def test_page_stands_alone_and_says_in_words_where_sqmap_loses(self):
         page = self.files["index.html"]
         self.assertNotRegex(page, r"<script|src=|href=\"(?!data:)")
@@ -433,6 +486,9 @@ class Smoke(SmokeRun):
         budget = self.rows("budgets", model="brick", family="sqmap-layer3")[0]
         self.assertEqual(float(rows["budgets", "brick", "32768 bytes", "sqmap-layer3", "us.median"]),
                          budget["us"]["median"])
+        curve = self.rows("curves", figure="probes", curve="sqmap-layer3")[0]
+        self.assertEqual(float(rows["curves", curve["model"], "probes", "sqmap-layer3", "y_spread.1.upper"]),
+                         curve["y_spread"][1]["upper"])
 
     def test_compare_finds_a_slower_frame_and_only_that(self):
         before, after = self.folder / "a.json", self.folder / "b.json"
@@ -501,6 +557,24 @@ class Draw(SmokeRun):
             self.assert_exit(refused, 4)
             self.assertIn(words, refused.stderr)
             self.assertEqual(files, {})
+
+    def test_results_of_before_curves_had_spreads_are_drawn_without_them(self):
+        older = without_spreads_of_curves(self.results)
+        done, files = self.drawn(older)
+        self.assert_exit(done, 0)
+        self.assertNotIn("<polygon", files["index.html"])
+        self.assertNotIn("Points of the curves of times", files["index.html"])
+        self.assertNotRegex(files["results.csv"], r"\.count,|y_spread")
+        self.assertEqual(files["fig14b.svg"].count("<path"), self.files["fig14b.svg"].count("<path"))
+
+    def test_words_on_curves_follow_their_spreads(self):
+        results = json.loads(self.files["results.json"])
+        for row in results["curves"]:
+            for index, spread in enumerate(row.get("y_spread", ())):
+                width = 0.3 if index == 0 else 0.1
+                spread["lower"], spread["upper"] = spread["median"], (1 + width) * spread["median"]
+        words = re.search(r"Points of the curves of times are medians of [\dto ]+ repetitions\..*?</p>", self.page_of(results))
+        self.assertIn("14a 10 and 30, ", words.group())
 
     def test_words_on_frames_follow_the_times(self):
         for factor, layer_3 in ((1e-6, "wins on 2 of 2"), (1e6, "wins on 0 of 2")):
