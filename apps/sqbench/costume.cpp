@@ -2,7 +2,6 @@
 #include "costume.hpp"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <cstdint>
 #include <limits>
@@ -117,14 +116,14 @@ void run_costume(const SuiteInput& input, const Model& model, Results& results) 
   Hits hits(cloud.count);
   const auto grid = make_grid(model, GridCode::kInt16SimdCulled, 128), bricks = make_bricks(model, 128);
   const auto refitted = make_fcl_sheet(model, sheet.mesh, TreeUpdate::kRefit);
-  const auto start = std::chrono::steady_clock::now();
-  const auto rebuilt = make_fcl_sheet(model, sheet.mesh, TreeUpdate::kRebuild);
-  const double passed_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-  for (const PeerRow& tree : results.peers)
+  std::vector<double> seconds;
+  const auto rebuilt =
+      make_timed([&] { return make_fcl_sheet(model, sheet.mesh, TreeUpdate::kRebuild); }, seconds);
+  for (PeerRow tree : results.peers)
     if (tree.model == model.name && tree.peer == kTreeReference) {  // the object's side is the same
-      add_peer_row({model.name, kRebuiltTree, tree.family, tree.bytes, passed_s,
-                    std::numeric_limits<double>::quiet_NaN(), false},
-                   results);
+      tree.peer = kRebuiltTree;
+      tree.build_s = spread_of(seconds);
+      results.peers.push_back(std::move(tree));
       break;
     }
 

@@ -2,12 +2,12 @@
 #include "field.hpp"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 
 #include "closest.hpp"
 #include "cloud.hpp"
 #include "model.hpp"
+#include "timing.hpp"
 
 namespace sqmap::bench {
 namespace {
@@ -101,10 +101,10 @@ double Field::sample(const Vec3d& p_m) const noexcept {
 }
 
 Field exact_field(const Model& model, unsigned resolution) {
-  const auto start = std::chrono::steady_clock::now();
+  const double start_s = wall_s();
   Field field = lattice_for(model, resolution);
   fill(model, EmbreeClosest(model.mesh), resolution, field);
-  field.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  field.seconds.push_back(wall_s() - start_s);
   return field;
 }
 

@@ -18,7 +18,7 @@ struct Field {
   double spacing_m{};                    ///< between neighbours
   std::array<std::uint32_t, 3> nodes{};  ///< along x, y, z
   std::vector<float> distance_m;         ///< shape [z, y, x]
-  double seconds{};                      ///< it took to compute
+  std::vector<double> seconds;           ///< it took to compute, each time on the wall clock
 
   std::size_t index(std::uint32_t x, std::uint32_t y, std::uint32_t z) const noexcept {
     return (std::size_t{z} * nodes[1] + y) * nodes[0] + x;

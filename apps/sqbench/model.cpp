@@ -4,11 +4,13 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numeric>
 #include <utility>
 
 #include "sqmap/io/bundle.hpp"
 
 #include "field.hpp"
+#include "timing.hpp"
 
 namespace sqmap::bench {
 namespace {
@@ -28,6 +30,22 @@ const Field& Model::field(unsigned resolution) const {
   auto& slot = fields[resolution];
   if (!slot) slot = std::make_shared<Field>(exact_field(*this, resolution));
   return *slot;
+}
+
+const std::vector<double>& Model::field_seconds(unsigned resolution) const {
+  field(resolution);
+  std::vector<double>& seconds = fields[resolution]->seconds;
+  while (!is_timed_enough(seconds)) seconds.push_back(exact_field(*this, resolution).seconds.front());
+  return seconds;
+}
+
+double Model::shared_s() const {
+  double sum_s = 0;
+  for (const auto& [resolution, field] : fields)
+    sum_s += std::accumulate(field->seconds.begin(), field->seconds.end(), 0.0);
+  for (const auto& [count, kept] : hulls)
+    sum_s += std::accumulate(kept.seconds.begin(), kept.seconds.end(), 0.0);
+  return sum_s;
 }
 
 void Model::find_box() {

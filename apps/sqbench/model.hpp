@@ -17,6 +17,11 @@ namespace sqmap::bench {
 
 struct Field;
 
+struct Hulls {
+  std::vector<bake::Mesh> meshes;
+  std::vector<double> seconds;  ///< they took to compute, each time on the wall clock
+};
+
 /// One object of the comparison: its mesh, its bundle, and the truth.
 struct Model {
   std::string name;  ///< of the mesh file, without extension
@@ -29,13 +34,17 @@ struct Model {
 
   /// The exact field at this resolution, computed once and shared by the grids of all codes.
   const Field& field(unsigned resolution) const;
+  /// How long that takes; computed again until it is timed often enough.
+  const std::vector<double>& field_seconds(unsigned resolution) const;
 
   /// Sets low_m and high_m from the mesh.
   void find_box();
 
-  mutable std::map<unsigned, std::shared_ptr<const Field>> fields;
-  /// Convex hulls, by the least number of them: computed once, as it takes up to minutes.
-  mutable std::map<std::size_t, std::vector<bake::Mesh>> hulls;
+  mutable std::map<unsigned, std::shared_ptr<Field>> fields;
+  /// Convex hulls, by the least number of them: kept, as they take up to minutes.
+  mutable std::map<std::size_t, Hulls> hulls;
+  /// Spent so far on fields and hulls.
+  double shared_s() const;
 };
 
 /// Reads `mesh` and `bundles`/STEM.h5. Errors: those of the two readers, and kBadOption where the bundle was

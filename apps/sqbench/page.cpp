@@ -45,6 +45,9 @@ class Table {
 
 bool is_ours(const std::string& peer) { return peer.starts_with("sqmap"); }
 
+/// How often it was timed.
+std::string times(const Spread& spread) { return spread.count == 0 ? "-" : fmt::to_string(spread.count); }
+
 std::string quartiles(const Spread& spread) { return number(spread.lower) + " - " + number(spread.upper); }
 
 std::string sentence(const std::string& words) { return "<p>" + escaped(words) + "</p>\n"; }
@@ -201,13 +204,26 @@ std::string curve_words(const Results& results) {
   if (counts.empty()) return {};
   std::string words;
   for (const auto& [figure, widths] : widths_percent)
-    words += fmt::format("{}{} {:.2g} and {:.2g}", words.empty() ? "" : ", ", figure,
+    words += fmt::format("{}{} {:.3g} and {:.3g}", words.empty() ? "" : ", ", figure,
                          spread_of(widths).median, *std::max_element(widths.begin(), widths.end()));
   return sentence(
-      fmt::format("Points of the curves of times are medians of {} repetitions. Their quartiles lie so many "
-                  "percent of the "
-                  "median apart, in the middle and at most: {}.",
+      fmt::format("Points of the curves of times are medians of {} repetitions. How far apart their "
+                  "quartiles are, in percent "
+                  "of the median, for the middle point of a figure and for the widest: {}.",
                   least_to_most(counts), words));
+}
+
+/// How often builds and bakes were repeated.
+std::string build_words(const Results& results) {
+  std::set<std::size_t> counts;
+  for (const PeerRow& row : results.peers) counts.insert(row.build_s.count);
+  for (const BakeRow& row : results.bake) counts.insert(row.seconds.count);
+  counts.erase(0);  // not told
+  if (counts.empty()) return {};
+  return sentence(
+      fmt::format("Seconds of builds and bakes are medians of {} repetitions, fewer the longer they "
+                  "take; the tables tell of how many, and the quartiles.",
+                  least_to_most(counts)));
 }
 
 /// Its ratio to itself is one in every repetition.
@@ -273,9 +289,10 @@ std::string tables(const Results& results) {
         table.html();
   }
   if (!results.peers.empty()) {
-    Table table({"model", "peer", "KB resident", "build, s", "stated error, %", "of"});
+    Table table({"model", "peer", "KB resident", "build, s", "quartiles", "times", "stated error, %", "of"});
     for (const PeerRow& row : results.peers)
-      table.row({row.model, row.peer, number(static_cast<double>(row.bytes) / kKilobyte), number(row.build_s),
+      table.row({row.model, row.peer, number(static_cast<double>(row.bytes) / kKilobyte),
+                 number(row.build_s.median), quartiles(row.build_s), times(row.build_s),
                  number(row.stated_error_percent), row.stated_is_mean ? "mean" : "every point"},
                 is_ours(row.peer));
     html +=
@@ -302,10 +319,12 @@ std::string tables(const Results& results) {
     html += "<h2>Memory</h2>\n" + table.html();
   }
   if (!results.bake.empty()) {
-    Table table({"model", "method", "target, %", "seconds", "KB", "eq. 35, %", "parts"});
+    Table table(
+        {"model", "method", "target, %", "seconds", "quartiles", "times", "KB", "eq. 35, %", "parts"});
     for (const BakeRow& row : results.bake)
-      table.row({row.model, row.method, number(row.target_percent), number(row.seconds),
-                 number(row.bytes / kKilobyte), number(row.eq35_percent), fmt::to_string(row.parts)},
+      table.row({row.model, row.method, number(row.target_percent), number(row.seconds.median),
+                 quartiles(row.seconds), times(row.seconds), number(row.bytes / kKilobyte),
+                 number(row.eq35_percent), fmt::to_string(row.parts)},
                 is_ours(row.method));
     html += "<h2>Baking</h2>\n" + table.html();
   }
@@ -364,8 +383,8 @@ std::string results_page(const Results& results, const std::vector<Picture>& pic
       "points sorted into blocks of 32 neighbours. Times of frames and points are processor time of the one "
       "thread, medians; in each repetition all methods take turns, and ratios are formed within a "
       "repetition. "
-      "What is prepared is timed once, by the clock on the wall. A KB is 1024 bytes.");
-  html += curve_words(results);
+      "What is prepared is timed by the clock on the wall. A KB is 1024 bytes.");
+  html += curve_words(results) + build_words(results);
   if (!pictures.empty()) html += "<h2>Pictures</h2>\n";
   for (const Picture& picture : pictures) html += "<figure>" + picture.svg + "</figure>\n";
   return html + tables(results) + "</body>\n</html>\n";

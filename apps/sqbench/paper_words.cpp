@@ -189,8 +189,8 @@ void add_error_words(const Results& results, std::vector<std::string>& words) {
   double least_s = std::numeric_limits<double>::infinity(), most_s = 0;
   for (const BakeRow& row : results.bake)
     if (row.method == "sqmap" && row.target_percent < 0.06) {
-      least_s = std::min(least_s, row.seconds);
-      most_s = std::max(most_s, row.seconds);
+      least_s = std::min(least_s, row.seconds.median);
+      most_s = std::max(most_s, row.seconds.median);
     }
   if (most_s > 0)
     words.push_back(fmt::format(

@@ -44,7 +44,23 @@ class Peer {
   /// The solids whose union the method took for the object, to hold its answers against. Empty: it took the
   /// mesh.
   virtual std::span<const bake::Mesh> stands_for() const { return {}; }
-  virtual double field_s() const { return 0; }  ///< time of the exact field it was made from, if any
+  /// Times of what it was made from and shares with others, the exact field or hulls [s], one a repetition:
+  /// makes them again where they were not timed often enough. Empty: it shares nothing.
+  virtual std::vector<double> shared_seconds(const Model&) const { return {}; }
+};
+
+/// A method that is made from the exact field.
+class FieldPeer : public Peer {
+ public:
+  std::vector<double> shared_seconds(const Model& model) const override {
+    return model.field_seconds(resolution_);
+  }
+
+ protected:
+  explicit FieldPeer(unsigned resolution) : resolution_(resolution) {}
+
+ private:
+  unsigned resolution_;  ///< of the field
 };
 
 inline constexpr double kWrongFoot = 0.005;      ///< of R_max

@@ -22,12 +22,11 @@ constexpr double kHalfDiagonal = 0.8660254037844387;
 constexpr std::array<std::size_t, 3> kStride{1, 3, 9};
 constexpr std::uint32_t kLeaf = 0x80000000;  ///< marks a child that is a leaf; the rest is its index
 
-class DistanceOctree : public Peer {
+class DistanceOctree : public FieldPeer {
  public:
   DistanceOctree(const Model& model, unsigned resolution, double bound_percent)
-      : band_m_(static_cast<float>(kBand * model.r_max_m())) {
+      : FieldPeer(resolution), band_m_(static_cast<float>(kBand * model.r_max_m())) {
     const Field& field = model.field(resolution);
-    field_s_ = field.seconds;
     const double bound_m = bound_percent / 100 * model.r_max_m();
     std::uint32_t longest = 1;
     for (std::size_t axis = 0; axis < 3; ++axis) longest = std::max(longest, field.nodes[axis] - 1);
@@ -65,7 +64,6 @@ class DistanceOctree : public Peer {
     return sizeof(*this) + nodes_.capacity() * sizeof(nodes_[0]) + leaves_.capacity() * sizeof(leaves_[0]);
   }
   StatedError stated_error() const override { return {stated_percent_, false}; }
-  double field_s() const override { return field_s_; }
 
  private:
   using Corners = std::array<float, 27>;  ///< distances [m] at (0, 1, 2)^3 halves of a leaf, x fastest
@@ -180,7 +178,7 @@ class DistanceOctree : public Peer {
   std::uint32_t depth_{}, root_{};
   std::vector<std::array<std::uint32_t, 8>> nodes_;
   std::vector<Corners> leaves_;
-  double stated_percent_{}, field_s_{};
+  double stated_percent_{};
 };
 
 }  // namespace

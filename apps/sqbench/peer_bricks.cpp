@@ -19,11 +19,10 @@ namespace {
 
 constexpr double kHalfDiagonal = 0.8660254037844387;  // as for dense grids
 
-class Bricks : public Peer {
+class Bricks : public FieldPeer {
  public:
-  Bricks(const Model& model, unsigned resolution) {
+  Bricks(const Model& model, unsigned resolution) : FieldPeer(resolution) {
     const Field& field = model.field(resolution);
-    field_s_ = field.seconds;
     const double band_m = kBand * model.r_max_m();
     std::uint32_t bricks[3];
     for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -59,7 +58,6 @@ class Bricks : public Peer {
     return sizeof(*this) + places_.capacity() * sizeof(std::int32_t) + records_.capacity() + near_.bytes();
   }
   StatedError stated_error() const override { return {stated_percent_, false}; }
-  double field_s() const override { return field_s_; }
 
  private:
   /// Byte offset of the new record, or -1 where nothing is asked for: everything farther in or out than the
@@ -92,7 +90,7 @@ class Bricks : public Peer {
   NearBricks near_;
   BrickView view_{};
   mutable std::vector<std::uint32_t> blocks_;  // of the last frame, kept to spare the allocation
-  double stated_percent_, field_s_;
+  double stated_percent_;
 };
 
 }  // namespace

@@ -19,11 +19,10 @@ namespace {
 /// does, and distances change by no more than that.
 constexpr double kHalfDiagonal = 0.8660254037844387;
 
-class DenseGrid : public Peer {
+class DenseGrid : public FieldPeer {
  public:
-  DenseGrid(const Model& model, GridCode code, unsigned resolution) : code_(code) {
+  DenseGrid(const Model& model, GridCode code, unsigned resolution) : FieldPeer(resolution), code_(code) {
     const Field& field = model.field(resolution);
-    field_s_ = field.seconds;
     view_.spacing_m = static_cast<float>(field.spacing_m);
     for (int axis = 0; axis < 3; ++axis) {
       view_.nodes[axis] = static_cast<float>(field.nodes[static_cast<std::size_t>(axis)]);
@@ -68,7 +67,6 @@ class DenseGrid : public Peer {
     return sizeof(*this) + distance_m_.capacity() * sizeof(float) + codes_.capacity() * sizeof(std::int16_t);
   }
   StatedError stated_error() const override { return {stated_percent_, false}; }
-  double field_s() const override { return field_s_; }
 
  private:
   void answer_scalar(const Cloud& cloud, const Placement& placement, Hits& hits) const {
@@ -98,7 +96,7 @@ class DenseGrid : public Peer {
   std::vector<float> distance_m_;
   std::vector<std::int16_t> codes_;
   DenseView view_{};
-  double stated_percent_, field_s_;
+  double stated_percent_;
 };
 
 }  // namespace

@@ -19,6 +19,7 @@
 #include <HACD/hacdHACD.h>
 
 #include "exact_answer.hpp"
+#include "timing.hpp"
 #include "union_oracle.hpp"
 #include "work.hpp"
 
@@ -98,10 +99,11 @@ std::vector<bake::Mesh> decomposed(const bake::Mesh& mesh, std::size_t least_hul
 class HullsPeer : public Peer {
  public:
   HullsPeer(const Model& model, std::size_t least_hulls)
-      : near_(model), band_m_(static_cast<float>(kBand * model.r_max_m())) {
-    auto& hulls = model.hulls[least_hulls];
-    if (hulls.empty()) hulls = decomposed(model.mesh, least_hulls);
-    for (const bake::Mesh& mesh : hulls) {
+      : least_hulls_(least_hulls), near_(model), band_m_(static_cast<float>(kBand * model.r_max_m())) {
+    Hulls& hulls = model.hulls[least_hulls];
+    if (hulls.meshes.empty())
+      hulls.meshes = make_timed([&] { return decomposed(model.mesh, least_hulls); }, hulls.seconds);
+    for (const bake::Mesh& mesh : hulls.meshes) {
       Hull hull{std::make_unique<btConvexHullShape>(), cast<float>(mesh.vertices_m.front()),
                 cast<float>(mesh.vertices_m.front())};
       for (const Vec3d& corner : mesh.vertices_m) {
@@ -146,6 +148,9 @@ class HullsPeer : public Peer {
   }
   StatedError stated_error() const override { return {stated_percent_, true}; }
   std::span<const bake::Mesh> stands_for() const override { return meshes_; }
+  std::vector<double> shared_seconds(const Model& model) const override {
+    return model.hulls[least_hulls_].seconds;
+  }
 
  private:
   /// What the hulls themselves are off, by exact distances to their meshes: no line of this is Bullet's.
@@ -189,6 +194,7 @@ class HullsPeer : public Peer {
     normal = results.normal;
   }
 
+  std::size_t least_hulls_;
   std::vector<Hull> hulls_;
   NearBox near_;
   float band_m_;

@@ -24,11 +24,10 @@ namespace {
 constexpr double kHalfDiagonal = 0.8660254037844387;  // as for dense grids
 
 template <class Code>
-class NanovdbPeer : public Peer {
+class NanovdbPeer : public FieldPeer {
  public:
-  NanovdbPeer(const Model& model, unsigned resolution) {
+  NanovdbPeer(const Model& model, unsigned resolution) : FieldPeer(resolution) {
     const Field& field = model.field(resolution);
-    field_s_ = field.seconds;
     origin_m_ = cast<float>(field.origin_m);
     per_m_ = static_cast<float>(1 / field.spacing_m);
     band_m_ = static_cast<float>(kBand * model.r_max_m());
@@ -70,7 +69,6 @@ class NanovdbPeer : public Peer {
   }
   std::size_t bytes() const override { return sizeof(*this) + handle_.size() + near_.bytes(); }
   StatedError stated_error() const override { return {stated_percent_, false}; }
-  double field_s() const override { return field_s_; }
 
  private:
   nanovdb::GridHandle<nanovdb::HostBuffer> handle_;
@@ -78,7 +76,7 @@ class NanovdbPeer : public Peer {
   NearBricks near_;
   Vec3f origin_m_;
   float per_m_{}, band_m_{};
-  double stated_percent_{}, field_s_{};
+  double stated_percent_{};
   mutable std::vector<std::uint32_t> blocks_;  // of the last frame, kept to spare the allocation
 };
 

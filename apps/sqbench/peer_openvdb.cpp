@@ -26,11 +26,10 @@ constexpr double kHalfDiagonal = 0.8660254037844387;  // as for dense grids
 using Tree = openvdb::FloatTree;
 using Leaf = Tree::LeafNodeType;
 
-class OpenvdbPeer : public Peer {
+class OpenvdbPeer : public FieldPeer {
  public:
-  OpenvdbPeer(const Model& model, unsigned resolution) {
+  OpenvdbPeer(const Model& model, unsigned resolution) : FieldPeer(resolution) {
     const Field& field = model.field(resolution);
-    field_s_ = field.seconds;
     origin_m_ = cast<float>(field.origin_m);
     per_m_ = static_cast<float>(1 / field.spacing_m);
     const double band_m = kBand * model.r_max_m();
@@ -72,7 +71,6 @@ class OpenvdbPeer : public Peer {
   }
   std::size_t bytes() const override { return sizeof(*this) + grid_->memUsage() + near_.bytes(); }
   StatedError stated_error() const override { return {stated_percent_, false}; }
-  double field_s() const override { return field_s_; }
 
  private:
   /// Two thirds of the cells lie in one leaf, which is then read without a further search.
@@ -99,7 +97,7 @@ class OpenvdbPeer : public Peer {
   NearBricks near_;
   Vec3f origin_m_;
   float per_m_{}, band_m_{};
-  double stated_percent_{}, field_s_{};
+  double stated_percent_{};
   mutable std::vector<std::uint32_t> blocks_;  // of the last frame, kept to spare the allocation
 };
 

@@ -2,42 +2,47 @@
 #include "peer_rows.hpp"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
+#include <utility>
 
-#include "field.hpp"
+#include "timing.hpp"
 
 namespace sqmap::bench {
 
 namespace {
 
-double field_seconds(const Model& model) {
-  double sum = 0;
-  for (const auto& [resolution, field] : model.fields) sum += field->seconds;
-  return sum;
+bool is_known(const std::string& model, const std::string& peer, const Results& results) {
+  return std::any_of(results.peers.begin(), results.peers.end(),
+                     [&](const PeerRow& row) { return row.model == model && row.peer == peer; });
 }
 
 }  // namespace
 
-BuiltPeer build_peer(const Entrant& entrant, const Model& model, Results& results) {
-  const double fields_before_s = field_seconds(model);
-  const auto start = std::chrono::steady_clock::now();
-  BuiltPeer built{entrant, entrant.build(model)};
-  const double passed_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-  // Grids share the exact field: each is charged for it, whoever asked first.
-  const double own_s = passed_s - (field_seconds(model) - fields_before_s);
-  const StatedError stated = built.peer->stated_error();
-  add_peer_row({model.name, entrant.id, entrant.family, built.peer->bytes(), own_s + built.peer->field_s(),
-                stated.percent, stated.is_mean},
-               results);
-  return built;
+std::vector<double> with_shared(std::vector<double> own_s, const std::vector<double>& shared_s) {
+  if (shared_s.empty()) return own_s;
+  own_s.resize(std::min(own_s.size(), shared_s.size()));
+  for (std::size_t i = 0; i < own_s.size(); ++i) own_s[i] += shared_s[i];
+  return own_s;
 }
 
-void add_peer_row(const PeerRow& row, Results& results) {
-  const bool is_known = std::any_of(results.peers.begin(), results.peers.end(), [&](const PeerRow& known) {
-    return known.model == row.model && known.peer == row.peer;
-  });
-  if (!is_known) results.peers.push_back(row);
+std::unique_ptr<Peer> build_timed(const Entrant& entrant, const Model& model, std::vector<double>& seconds) {
+  const double shared_before_s = model.shared_s();
+  std::vector<double> own_s;
+  auto peer = make_timed([&] { return entrant.build(model); }, own_s);
+  // The first to ask makes what is shared, and each is charged for it.
+  own_s.front() -= model.shared_s() - shared_before_s;
+  seconds = with_shared(std::move(own_s), peer->shared_seconds(model));
+  return peer;
+}
+
+BuiltPeer build_peer(const Entrant& entrant, const Model& model, Results& results) {
+  if (is_known(model.name, entrant.id, results)) return {entrant, entrant.build(model)};
+  std::vector<double> seconds;
+  BuiltPeer built{entrant, build_timed(entrant, model, seconds)};
+  const StatedError stated = built.peer->stated_error();
+  results.peers.push_back({model.name, entrant.id, entrant.family, built.peer->bytes(), spread_of(seconds),
+                           stated.percent, stated.is_mean});
+  return built;
 }
 
 void check_frames(const Model& model, const Cloud& cloud, const Placement& placement,

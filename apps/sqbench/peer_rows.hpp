@@ -14,11 +14,13 @@ struct BuiltPeer {
   std::unique_ptr<Peer> peer;
 };
 
-/// Builds a peer and records its size and build time, the exact field's included.
+/// Seconds that making a method takes, one a repetition, with those of what it shares with others: as many as
+/// there are of both.
+std::vector<double> with_shared(std::vector<double> own_s, const std::vector<double>& shared_s);
+/// Builds a peer until it is timed often enough. `seconds`: what each took, as above.
+std::unique_ptr<Peer> build_timed(const Entrant& entrant, const Model& model, std::vector<double>& seconds);
+/// Builds a peer, and records its size and build time unless an earlier suite has.
 BuiltPeer build_peer(const Entrant& entrant, const Model& model, Results& results);
-/// Adds the row unless an earlier suite has.
-void add_peer_row(const PeerRow& row, Results& results);
-
 /// Holds every peer's answers for one placed cloud against the oracle: stated errors of points within the
 /// band.
 void check_frames(const Model& model, const Cloud& cloud, const Placement& placement,

@@ -258,9 +258,10 @@ void add_rest(const Results& results, std::vector<Picture>& pictures) {
       "microseconds", effects);
   SeriesByFamily bake;
   for (const BakeRow& row : results.bake)
-    bake.add(row.model, {row.eq35_percent, row.seconds, row.bytes,
-                         fmt::format("{}: {:.3g} %, {:.3g} s, {:.3g} KB, {} parts", row.model,
-                                     row.eq35_percent, row.seconds, row.bytes / kKilobyte, row.parts)});
+    bake.add(row.model,
+             {row.eq35_percent, row.seconds.median, row.bytes,
+              fmt::format("{}: {:.3g} %, {:.3g} s, {:.3g} KB, {} parts", row.model, row.eq35_percent,
+                          row.seconds.median, row.bytes / kKilobyte, row.parts)});
   if (!bake.series.empty())
     pictures.push_back({"bake", "What accuracy costs in baking",
                         scatter_svg("What accuracy costs in baking", "error of the maps (eq. 35), % of R_max",

@@ -41,7 +41,7 @@ struct ModelRow {
 struct PeerRow {
   std::string model, peer, family;
   std::size_t bytes{};
-  double build_s{};
+  Spread build_s;                 ///< on the wall clock, with what it shares with other peers
   double stated_error_percent{};  ///< NaN: none, the method tells contacts only
   bool stated_is_mean{};
 };
@@ -78,7 +78,7 @@ struct MemoryRow {
 struct BakeRow {
   std::string model, method;
   double target_percent{};  ///< of eq. (35); NaN for grids
-  double seconds{};
+  Spread seconds;           ///< on the wall clock
   double bytes{};
   double eq35_percent{};  ///< reached; NaN for grids
   std::size_t parts{};

@@ -54,7 +54,8 @@ void fields(PeerRow& r, Visit& visit) {
   visit("peer", r.peer);
   visit("family", r.family);
   visit("bytes", r.bytes);
-  visit("build_s", r.build_s);
+  visit("build_s", r.build_s.median);
+  visit.optional("build_s_spread", r.build_s);
   visit("stated_error_percent", r.stated_error_percent);
   std::string stated_for = r.stated_is_mean ? "mean" : "every point";
   visit("stated_for", stated_for);
@@ -110,7 +111,8 @@ void fields(BakeRow& r, Visit& visit) {
   visit("model", r.model);
   visit("method", r.method);
   visit("target_percent", r.target_percent);
-  visit("seconds", r.seconds);
+  visit("seconds", r.seconds.median);
+  visit.optional("seconds_spread", r.seconds);
   visit("bytes", r.bytes);
   visit("eq35_percent", r.eq35_percent);
   visit("parts", r.parts);
@@ -188,6 +190,7 @@ template <class T>
 constexpr bool kIsPlain = std::is_arithmetic_v<T> || std::is_same_v<T, std::string>;
 
 bool is_told(std::size_t count) { return count > 0; }
+bool is_told(const Spread& spread) { return is_told(spread.count); }
 bool is_told(const std::vector<Spread>& spreads) { return !spreads.empty(); }
 
 struct Writer {

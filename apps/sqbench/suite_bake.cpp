@@ -2,10 +2,10 @@
 //
 // What preparing an object costs, for each accuracy asked for.
 #include <algorithm>
-#include <chrono>
 #include <limits>
 #include <span>
 #include <stdexcept>
+#include <vector>
 
 #include <fmt/format.h>
 
@@ -15,16 +15,9 @@
 #include "drawings.hpp"
 #include "field.hpp"
 #include "suites.hpp"
+#include "timing.hpp"
 
 namespace sqmap::bench {
-namespace {
-
-double seconds_since(std::chrono::steady_clock::time_point start) {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-}
-
-}  // namespace
-
 void run_bake(const SuiteInput& input, Results& results) {
   draw_objects(input, results);
   constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
@@ -42,22 +35,23 @@ void run_bake(const SuiteInput& input, Results& results) {
       source.hash = model.asset.provenance.source_hash;
       bake::BakeOptions options;
       options.max_error_percent = target;
-      const auto start = std::chrono::steady_clock::now();
-      const auto baked = bake::bake(source, options);
+      std::vector<double> seconds;
+      const auto baked = make_timed([&] { return bake::bake(source, options); }, seconds);
       if (!baked) throw std::runtime_error("bake " + model.name + ": " + baked.error().finding);
-      const double seconds = seconds_since(start);
       const auto bytes = io::encode(baked.value().asset);
       if (!bytes) throw std::runtime_error("encode " + model.name + ": " + bytes.error().finding);
       double reached = kNan;
       for (const ErrorRow& row : baked.value().asset.errors)
         if (row.level == 0 && row.layer == 2) reached = row.eq35_percent;
-      results.bake.push_back({model.name, "sqmap", target, seconds, static_cast<double>(bytes.value().size()),
-                              reached, baked.value().asset.parts.size()});
+      results.bake.push_back({model.name, "sqmap", target, spread_of(seconds),
+                              static_cast<double>(bytes.value().size()), reached,
+                              baked.value().asset.parts.size()});
     }
     for (const unsigned resolution : {32U, 64U, 128U}) {
-      const Field field = exact_field(model, resolution);
-      results.bake.push_back({model.name, fmt::format("exact-field-{}", resolution), kNan, field.seconds,
-                              static_cast<double>(field.distance_m.size() * sizeof(float)), kNan, 0});
+      results.bake.push_back({model.name, fmt::format("exact-field-{}", resolution), kNan,
+                              spread_of(model.field_seconds(resolution)),
+                              static_cast<double>(model.field(resolution).distance_m.size() * sizeof(float)),
+                              kNan, 0});
     }
   }
 }

@@ -75,15 +75,15 @@ std::vector<Ladder> ladders() {
 }
 
 /// The largest that fits; none where not even the least does.
-std::optional<BuiltPeer> finest(const Ladder& ladder, const Model& model, double budget_bytes,
-                                Results& unused) {
+std::optional<BuiltPeer> finest(const Ladder& ladder, const Model& model, double budget_bytes) {
   std::optional<BuiltPeer> best;
   int low = ladder.least, high = ladder.most;
   while (low <= high) {
     const int middle = low + (high - low) / 2;
-    BuiltPeer built = build_peer(ladder.at(middle), model, unused);
-    if (static_cast<double>(built.peer->bytes()) <= budget_bytes) {
-      best = std::move(built);
+    const Entrant entrant = ladder.at(middle);
+    std::unique_ptr<Peer> peer = entrant.build(model);
+    if (static_cast<double>(peer->bytes()) <= budget_bytes) {
+      best = BuiltPeer{entrant, std::move(peer)};
       low = middle + 1;
     } else {
       high = middle - 1;
@@ -176,7 +176,6 @@ BudgetRow errors_of(const Model& model, const Peer& peer, const Shell& shell, co
 void run_model(const SuiteInput& input, const Model& model, double budget_bytes, const Shell& shell,
                const Cloud& cloud, const Probe& probe, const Sequence& sequence, Results& results) {
   input.note(fmt::format("budget: {}, {} KB", model.name, budget_bytes / 1024));
-  Results unused;  // settings that were tried on the way are no peers of the report
   std::vector<BuiltPeer> peers;
   const std::optional<Model> baked = bake_within(input, model, budget_bytes);
   if (baked)
@@ -186,7 +185,7 @@ void run_model(const SuiteInput& input, const Model& model, double budget_bytes,
       peers.back().entrant.family = id;
     }
   for (const Ladder& ladder : ladders())
-    if (auto built = finest(ladder, model, budget_bytes, unused)) peers.push_back(std::move(*built));
+    if (auto built = finest(ladder, model, budget_bytes)) peers.push_back(std::move(*built));
 
   Hits hits(probe.cloud.count);
   std::vector<Contestant> contestants;

@@ -2,7 +2,6 @@
 //
 // The probe against each object, whole frames: every point of the probe within the band, or all contacts.
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <iterator>
 #include <limits>
@@ -141,12 +140,12 @@ void run_model(const SuiteInput& input, const Model& model, Results& results) {
   std::vector<BuiltContactPeer> contact_peers;
   for (const ContactEntrant& entrant : kContactEntrants) {
     if (input.is_smoke && entrant.resolution > 128) continue;
-    const auto start = std::chrono::steady_clock::now();
-    contact_peers.push_back({&entrant, entrant.build(model, probe.mesh)});
-    const double passed_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-    add_peer_row({model.name, entrant.id, entrant.family, contact_peers.back().peer->bytes(), passed_s,
-                  std::numeric_limits<double>::quiet_NaN(), false},
-                 results);
+    std::vector<double> own_s, field_s;
+    if (entrant.resolution > 0) field_s = model.field_seconds(entrant.resolution);
+    contact_peers.push_back({&entrant, make_timed([&] { return entrant.build(model, probe.mesh); }, own_s)});
+    results.peers.push_back({model.name, entrant.id, entrant.family, contact_peers.back().peer->bytes(),
+                             spread_of(with_shared(own_s, field_s)), std::numeric_limits<double>::quiet_NaN(),
+                             false});
   }
 
   Hits hits(probe.cloud.count);

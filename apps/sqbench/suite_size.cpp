@@ -4,7 +4,6 @@
 // object is one smooth shape, tessellated ever finer.
 #include <algorithm>
 #include <array>
-#include <chrono>
 #include <cmath>
 #include <map>
 #include <random>
@@ -13,6 +12,7 @@
 
 #include "baked.hpp"
 #include "peer.hpp"
+#include "peer_rows.hpp"
 #include "suites.hpp"
 #include "timing.hpp"
 #include "work.hpp"
@@ -51,8 +51,14 @@ bake::Mesh wavy_ball(unsigned subdivisions) {
   return mesh;
 }
 
-double seconds_since(std::chrono::steady_clock::time_point start) {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+/// The methods of both.
+std::vector<Entrant> entrants() {
+  return {
+      {"sqmap-layer2", "", [](const Model& model) { return make_sqmap(model, 2, 0); }},
+      {"sqmap-layer3", "", [](const Model& model) { return make_sqmap(model, 3, 0); }},
+      {kReference, "", [](const Model& model) { return make_grid(model, GridCode::kInt16SimdCulled, 128); }},
+      {kBricks, "", [](const Model& model) { return make_bricks(model, 128); }},
+      {"embree-closest", "", make_embree}};
 }
 
 /// One line a method, over several sizes.
@@ -83,32 +89,28 @@ void run_objects(const SuiteInput& input, Results& results) {
     input.note(fmt::format("size: object of {} faces", mesh.faces.size()));
     bake::BakeOptions options;
     if (input.is_smoke) options.max_error_percent = 1, options.sample_count = 2000;
-    auto start = std::chrono::steady_clock::now();
-    const Model model = baked_model("wavy ball", mesh, options);
-    builds.add("sqmap: bake", faces, spread_of({seconds_since(start)}));
+    const auto add_build = [&](const std::string& name, const std::vector<double>& seconds) {
+      builds.add(name, faces, spread_of(seconds));
+    };
+    std::vector<double> bake_s, tree_s;
+    const Model model = make_timed([&] { return baked_model("wavy ball", mesh, options); }, bake_s);
+    add_build("sqmap: bake", bake_s);
     const Probe probe = scaled_probe(input.probe, model);
     const Sequence sequence = make_sequence(model, probe, Contact::kTouching, input.is_smoke ? 2 : 6);
 
-    std::vector<std::pair<std::string, std::unique_ptr<Peer>>> peers;
-    const auto add = [&](const std::string& name, auto build) {
-      start = std::chrono::steady_clock::now();
-      peers.emplace_back(name, build());
-      const double seconds = seconds_since(start) + peers.back().second->field_s();
-      if (!name.starts_with("sqmap")) builds.add(name, faces, spread_of({seconds}));
-    };
-    add("sqmap-layer2", [&] { return make_sqmap(model, 2, 0); });
-    add("sqmap-layer3", [&] { return make_sqmap(model, 3, 0); });
-    add(kReference, [&] { return make_grid(model, GridCode::kInt16SimdCulled, 128); });
-    add(kBricks, [&] { return make_bricks(model, 128); });
-    add("embree-closest", [&] { return make_embree(model); });
-    start = std::chrono::steady_clock::now();
-    const auto tree = make_fcl(model, probe.mesh, FclTree::kObb, false);
-    builds.add(kTreeReference, faces, spread_of({seconds_since(start)}));
+    std::vector<BuiltPeer> peers;
+    for (const Entrant& entrant : entrants()) {
+      std::vector<double> seconds;
+      peers.push_back({entrant, build_timed(entrant, model, seconds)});
+      if (!entrant.id.starts_with("sqmap")) add_build(entrant.id, seconds);  // ours is baked
+    }
+    const auto tree = make_timed([&] { return make_fcl(model, probe.mesh, FclTree::kObb, false); }, tree_s);
+    add_build(kTreeReference, tree_s);
 
     Hits hits(probe.cloud.count);
     std::vector<Contestant> contestants;
-    for (const auto& [name, peer] : peers)
-      contestants.push_back({name, [&, one = peer.get()](std::size_t pose) {
+    for (const BuiltPeer& built : peers)
+      contestants.push_back({built.entrant.id, [&, one = built.peer.get()](std::size_t pose) {
                                one->answer(probe.cloud, sequence.object_from_probe[pose], hits);
                                return hits.count;
                              }});
@@ -149,20 +151,16 @@ void run_probes(const SuiteInput& input, const Model& model, Results& results) {
   Curves frames("probes", model.name);
   const Probe probe = scaled_probe(input.probe, model);
   const Sequence sequence = make_sequence(model, probe, Contact::kTouching, input.is_smoke ? 2 : 6);
-  std::vector<std::pair<std::string, std::unique_ptr<Peer>>> peers;
-  peers.emplace_back("sqmap-layer2", make_sqmap(model, 2, 0));
-  peers.emplace_back("sqmap-layer3", make_sqmap(model, 3, 0));
-  peers.emplace_back(kReference, make_grid(model, GridCode::kInt16SimdCulled, 128));
-  peers.emplace_back(kBricks, make_bricks(model, 128));
-  peers.emplace_back("embree-closest", make_embree(model));
+  std::vector<BuiltPeer> peers;
+  for (const Entrant& entrant : entrants()) peers.push_back({entrant, entrant.build(model)});
   for (const std::size_t count : {100U, 1000U, 10000U, 100000U, 1000000U}) {
     if (input.is_smoke && count > 1000) break;
     input.note(fmt::format("size: probe of {} points", count));
     const Cloud cloud(points_on(probe.mesh, count));
     Hits hits(cloud.count);
     std::vector<Contestant> contestants;
-    for (const auto& [name, peer] : peers)
-      contestants.push_back({name, [&, one = peer.get()](std::size_t pose) {
+    for (const BuiltPeer& built : peers)
+      contestants.push_back({built.entrant.id, [&, one = built.peer.get()](std::size_t pose) {
                                one->answer(cloud, sequence.object_from_probe[pose], hits);
                                return hits.count;
                              }});

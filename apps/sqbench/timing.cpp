@@ -2,6 +2,7 @@
 #include "timing.hpp"
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <ctime>
 #include <limits>
@@ -79,6 +80,16 @@ std::vector<Timing> measure(const std::vector<Contestant>& contestants, std::siz
       timings[c].seconds.push_back(seconds / static_cast<double>(rounds[c] * items));
     }
   return timings;
+}
+
+double wall_s() noexcept {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
+
+bool is_timed_enough(const std::vector<double>& seconds) noexcept {
+  if (seconds.empty()) return false;
+  const double longest_s = *std::max_element(seconds.begin(), seconds.end());
+  return seconds.size() >= (longest_s < kTwice_s ? kMakings : longest_s < kOnce_s ? 2 : 1);
 }
 
 bool pin_thread() {

@@ -3,7 +3,10 @@
 
 #include <cstddef>
 #include <functional>
+#include <optional>
 #include <string>
+#include <type_traits>
+#include <utility>
 #include <vector>
 
 #include "results.hpp"
@@ -33,6 +36,29 @@ std::vector<Timing> measure(const std::vector<Contestant>& contestants, std::siz
                             std::size_t repetitions);
 inline constexpr double kShortest_s = 5e-4, kLong_s = 0.05;
 inline constexpr std::size_t kTurnsOfLong = 5;
+
+/// Of the clock on the wall, from some moment on [s].
+double wall_s() noexcept;
+
+/// What is prepared is timed kMakings times, but twice where it took kTwice_s or more, and once where
+/// kOnce_s: so a run takes no more than minutes longer.
+bool is_timed_enough(const std::vector<double>& seconds) noexcept;
+inline constexpr std::size_t kMakings = 3;
+inline constexpr double kTwice_s = 0.2, kOnce_s = 10;
+
+/// Makes the same thing until it is timed often enough, and returns the last. Adds to `seconds` what each
+/// took on the wall clock.
+template <class Make>
+auto make_timed(const Make& make, std::vector<double>& seconds) {
+  std::optional<std::invoke_result_t<const Make&>> made;
+  do {
+    made.reset();  // there may be no room for two
+    const double start_s = wall_s();
+    made.emplace(make());
+    seconds.push_back(wall_s() - start_s);
+  } while (!is_timed_enough(seconds));
+  return std::move(*made);
+}
 
 /// Keeps this thread on one core. False where the system refuses.
 bool pin_thread();
