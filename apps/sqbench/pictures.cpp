@@ -55,7 +55,7 @@ void add_accuracy(const Results& results, std::vector<Picture>& pictures) {
             fmt::format("{}: {:.3g} %, {:.3g} ns a point, {:.3g} KB, normals {:.2g} deg", row.peer,
                         row.mean_error_percent, row.ns.median, bytes / kKilobyte, row.normal_mean_deg);
         const double shown_percent = std::max(row.mean_error_percent, kLeastError_percent);
-        time.add(peer->family, {shown_percent, row.ns.median, bytes, label});
+        time.add(peer->family, {shown_percent, row.ns.median, bytes, label, row.ns.lower, row.ns.upper});
         size.add(peer->family, {shown_percent, bytes / kKilobyte, bytes, label});
         angle.add(peer->family, {std::max(row.normal_mean_deg, 0.1), bytes / kKilobyte, bytes, label});
       }
@@ -258,10 +258,10 @@ void add_rest(const Results& results, std::vector<Picture>& pictures) {
       "microseconds", effects);
   SeriesByFamily bake;
   for (const BakeRow& row : results.bake)
-    bake.add(row.model,
-             {row.eq35_percent, row.seconds.median, row.bytes,
-              fmt::format("{}: {:.3g} %, {:.3g} s, {:.3g} KB, {} parts", row.model, row.eq35_percent,
-                          row.seconds.median, row.bytes / kKilobyte, row.parts)});
+    bake.add(row.model, {row.eq35_percent, row.seconds.median, row.bytes,
+                         fmt::format("{}: {:.3g} %, {:.3g} s, {:.3g} KB, {} parts", row.model,
+                                     row.eq35_percent, row.seconds.median, row.bytes / kKilobyte, row.parts),
+                         row.seconds.lower, row.seconds.upper});
   if (!bake.series.empty())
     pictures.push_back({"bake", "What accuracy costs in baking",
                         scatter_svg("What accuracy costs in baking", "error of the maps (eq. 35), % of R_max",

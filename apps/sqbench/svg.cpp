@@ -278,14 +278,14 @@ std::string escaped(const std::string& words) {
 std::string scatter_svg(const std::string& title, const std::string& x_title, const std::string& y_title,
                         const std::vector<Series>& series) {
   constexpr double kLeft = 80, kRight = 610, kTop = 44, kBottom = 500;
-  const double height = std::max(560.0, kTop + 20.0 * static_cast<double>(series.size()) + 140);
+  const double height = std::max(560.0, kTop + 20.0 * static_cast<double>(series.size()) + 160);
   double x_low = std::numeric_limits<double>::infinity(), x_high = 0, y_low = x_low, y_high = 0;
   for (const Series& one : series)
     for (const Disc& disc : one.discs) {
       x_low = std::min(x_low, disc.x);
       x_high = std::max(x_high, disc.x);
-      y_low = std::min(y_low, disc.y);
-      y_high = std::max(y_high, disc.y);
+      y_low = std::min(y_low, std::fmin(disc.y, disc.lower));  // NaN: y
+      y_high = std::max(y_high, std::fmax(disc.y, disc.upper));
     }
   std::string svg = opening(height, title);
   if (!(x_low > 0) || !(y_low > 0) || !std::isfinite(x_low))
@@ -296,6 +296,7 @@ std::string scatter_svg(const std::string& title, const std::string& x_title, co
   double legend = kTop + 12;
   const std::vector<const char*> colours = colours_of(series);
   std::string ours;  // above the others
+  bool has_quartiles = false;
   for (std::size_t i = 0; i < series.size(); ++i) {
     const char* colour = colours[i];
     const bool is_ours = series[i].name.starts_with("sqmap");
@@ -306,12 +307,19 @@ std::string scatter_svg(const std::string& title, const std::string& x_title, co
     drawn += fmt::format(
         "<polyline points=\"{}\" fill=\"none\" stroke=\"{}\" stroke-opacity=\"{}\" stroke-width=\"{}\"/>\n",
         line, colour, is_ours ? 0.9 : 0.5, is_ours ? 2 : 1);
-    for (const Disc& disc : series[i].discs)
+    for (const Disc& disc : series[i].discs) {
+      if (disc.lower > 0)
+        drawn += fmt::format(
+            "<line class=\"quartiles\" x1=\"{0:.1f}\" x2=\"{0:.1f}\" y1=\"{1:.1f}\" y2=\"{2:.1f}\" "
+            "stroke=\"{3}\"/>\n",
+            x.at(disc.x), y.at(disc.lower), y.at(disc.upper), colour);
       drawn += fmt::format(
           "<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"{:.1f}\" fill=\"{}\" fill-opacity=\"{}\" "
           "stroke=\"{}\"><title>{}</title></circle>\n",
           x.at(disc.x), y.at(disc.y), disc_radius(disc.bytes), colour, is_ours ? 0.6 : 0.3, colour,
           escaped(disc.label));
+      has_quartiles |= disc.lower > 0;
+    }
     svg +=
         fmt::format("<circle cx=\"{}\" cy=\"{}\" r=\"5\" fill=\"{}\"/>\n", kRight + 24, legend - 4, colour);
     svg += text(kRight + 36, legend, "start", series[i].name, weight_of(series[i].name));
@@ -328,6 +336,7 @@ std::string scatter_svg(const std::string& title, const std::string& x_title, co
     svg += text(kRight + 80, legend + r + 4, "start", name);
     legend += 2 * r + 8;
   }
+  if (has_quartiles) svg += text(kRight + 18, legend + 16, "start", "line through a disc: quartiles");
   return svg + "</svg>\n";
 }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -10,6 +11,8 @@ namespace sqmap::bench {
 struct Disc {
   double x{}, y{}, bytes{};  ///< bytes: the disc's radius, on a logarithmic scale from 1 KB on
   std::string label;         ///< shown when the pointer rests on it
+  /// Quartiles of y, drawn as a line through the disc; NaN: none.
+  double lower = std::numeric_limits<double>::quiet_NaN(), upper = lower;
 };
 /// Discs of one colour, joined by a line in their order.
 struct Series {

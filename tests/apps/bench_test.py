@@ -457,6 +457,16 @@ class Smoke(SmokeRun):
             self.assertTrue(float(low.split(",")[1]) >= float(y) >= float(high.split(",")[1]))  # y is downwards
         self.assertNotIn("<polygon", self.files["fig13a.svg"])
 
+    def test_quartiles_of_a_time_are_a_line_through_its_disc(self):
+        for name, count in (("time-ball-3.svg", len(self.rows("accuracy", model="ball", shell_percent=3.0))),
+                            ("bake.svg", len([row for row in self.results["bake"] if row["method"] == "sqmap"])),
+                            ("size-ball-3.svg", 0)):
+            self.assertEqual(self.files[name].count("<line class=\"quartiles\""), count, name)
+            self.assertEqual("line through a disc: quartiles" in self.files[name], count > 0, name)
+        low, high = re.search(r"class=\"quartiles\".*? y1=\"([\d.]+)\" y2=\"([\d.]+)\"", self.files["bake.svg"]).groups()
+        middle = re.search(r"cy=\"([\d.]+)\"", self.files["bake.svg"]).group(1)
+        self.assertTrue(float(low) >= float(middle) >= float(high))  # y is downwards
+
     def test_page_stands_alone_and_says_in_words_where_sqmap_loses(self):
         page = self.files["index.html"]
         self.assertNotRegex(page, r"<script|src=|href=\"(?!data:)")
@@ -585,7 +595,7 @@ class Draw(SmokeRun):
         self.assertNotIn("Points of the curves of times", files["index.html"])
         self.assertNotRegex(files["results.csv"], r"\.count,|_spread")
         self.assertNotIn("Seconds of builds and bakes", files["index.html"])
-        self.assertEqual(files["bake.svg"], self.files["bake.svg"])
+        self.assertNotIn("quartiles", files["bake.svg"])
         self.assertEqual(files["fig14b.svg"].count("<path"), self.files["fig14b.svg"].count("<path"))
 
     def test_words_on_curves_follow_their_spreads(self):
