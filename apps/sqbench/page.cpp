@@ -138,7 +138,7 @@ std::string losses_in_shell(const Results& results, double shell_percent, double
 
 /// What is not answered is in no mean: it is said beside them.
 std::string answered_words(const Results& results, double shell_percent) {
-  double wrong = 0, answered = 0, angle_deg = 0, best_angle_deg = INFINITY, rivals_least = 100;
+  double wrong = 0, answered = 0, angle_deg = 0, rivals_least = 100;
   std::size_t models = 0;
   std::map<std::string, std::pair<double, std::size_t>> angles;
   for (const AccuracyRow& row : results.accuracy) {
@@ -156,24 +156,28 @@ std::string answered_words(const Results& results, double shell_percent) {
   }
   if (models == 0) return {};
   const auto count = static_cast<double>(models);
-  std::set<std::string> better;
-  for (const auto& [peer, sum] : angles) {
-    const double mean_deg = sum.first / static_cast<double>(sum.second);
-    if (mean_deg < angle_deg / count) better.insert(peer);
-    best_angle_deg = std::min(best_angle_deg, mean_deg);
-  }
-  return sentence(
-      fmt::format("In the +-{} % shell sqmap (layer 3) puts {:.2g} % of the points on the wrong side, and of "
-                  "the points outside "
-                  "the object it knows a distance for {:.3g} %: the others lie outside every superquadric, "
-                  "and are in none of its "
-                  "means. Of the rivals that tell distances, none knows less than {:.4g} %. Its normals are "
-                  "off by {:.3g} degrees "
-                  "in the mean; {}",
-                  shell_percent, wrong / count, answered / count, rivals_least, angle_deg / count,
-                  better.empty() ? "no rival's are closer."
-                                 : fmt::format("those of {} are closer, the closest by {:.3g} degrees.",
-                                               joined(better), angle_deg / count - best_angle_deg)));
+  std::vector<std::pair<double, std::string>> closer;  // by their mean angle
+  for (const auto& [peer, sum] : angles)
+    if (const double mean_deg = sum.first / static_cast<double>(sum.second); mean_deg < angle_deg / count)
+      closer.emplace_back(mean_deg, peer);
+  std::sort(closer.begin(), closer.end());
+  constexpr std::size_t kNamed = 3;  // the table has the others
+  std::string named;
+  for (std::size_t i = 0; i < std::min(closer.size(), kNamed); ++i)
+    named += fmt::format("{}{} by {:.3g}", i == 0 ? "" : ", ", closer[i].second,
+                         angle_deg / count - closer[i].first);
+  return sentence(fmt::format(
+      "In the +-{} % shell sqmap (layer 3) puts {:.2g} % of the points on the wrong side, and of "
+      "the points outside "
+      "the object it knows a distance for {:.3g} %: the others lie outside every superquadric, "
+      "and are in none of its "
+      "means. Of the rivals that tell distances, none knows less than {:.4g} %. Its normals are "
+      "off by {:.3g} degrees "
+      "in the mean; {}",
+      shell_percent, wrong / count, answered / count, rivals_least, angle_deg / count,
+      closer.empty() ? "no rival's are closer."
+                     : fmt::format("those of {} settings of rivals are closer, most of all {} degrees.",
+                                   closer.size(), named)));
 }
 
 std::string accuracy_words(const Results& results) {

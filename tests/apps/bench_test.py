@@ -638,6 +638,22 @@ class Draw(SmokeRun):
         self.assertIn("It does not hold at 32 KB.", page)
         self.assertIn("sqmap fits for 1 of 2 models only", page)
 
+    def test_words_on_normals_name_the_three_closest_rivals_and_count_all(self):
+        results = json.loads(self.files["results.json"])
+        rivals = [row["peer"] for row in self.rows("accuracy", model="ball", shell_percent=3.0)
+                  if not row["peer"].startswith("sqmap")]
+        closest = sorted(rivals[:4])
+        for row in results["accuracy"]:
+            row["normal_mean_deg"] = 10 if row["peer"] == "sqmap-layer3" else 11
+            if row["peer"] in closest:
+                row["normal_mean_deg"] = 1 + closest.index(row["peer"])
+        words = re.search(r"In the \+-3 % shell.*?Its normals (.*?)</p>", self.page_of(results)).group(1)
+        self.assertEqual(words, f"are off by 10 degrees in the mean; those of 4 settings of rivals are closer, most of all "
+                                f"{closest[0]} by 9, {closest[1]} by 8, {closest[2]} by 7 degrees.")
+        for row in results["accuracy"]:
+            row["normal_mean_deg"] = 10
+        self.assertEqual(self.page_of(results).count("no rival's are closer"), 2)
+
     def test_trees_that_took_no_part_are_not_beaten(self):
         page = self.page_of(self.results)
         costume = re.search(r"Fig. 11b, costume: .*?</p>", page).group()
