@@ -80,10 +80,9 @@ const Entrant kCgal{"cgal-closest", "cgal-closest", make_cgal, 0};
 std::vector<Entrant> frame_entrants(const Model& model, bool smoke) {
   std::vector<Entrant> entrants{sqmap_entrant(1, 0), sqmap_entrant(2, 0), sqmap_entrant(3, 0)};
   for (const unsigned resolution : {64U, 128U, 256U})
-    for (const GridCode code : {GridCode::kInt16Simd, GridCode::kInt16SimdCulled})
+    for (const GridCode code :
+         {GridCode::kInt16Simd, GridCode::kInt16SimdCulled, GridCode::kFloatSimd, GridCode::kFloatScalar})
       if (!smoke || resolution < 256) entrants.push_back(grid_entrant(code, resolution));
-  entrants.push_back(grid_entrant(GridCode::kFloatSimd, 128));
-  entrants.push_back(grid_entrant(GridCode::kFloatScalar, 128));
   for (const unsigned resolution : {64U, 128U}) entrants.push_back(bricks_entrant(resolution));
   entrants.push_back(nanovdb_entrant(NanovdbCode::kFloat, 128));
   entrants.push_back(nanovdb_entrant(NanovdbCode::k8Bit, 128));
@@ -107,6 +106,7 @@ std::vector<Entrant> accuracy_entrants(const Model& model, bool smoke) {
       entrants.push_back(sqmap_entrant(layer, level, rows_of(model.asset, level)));
   for (const unsigned resolution : {16U, 32U, 64U, 128U, 256U}) {
     if (smoke && resolution > 128) continue;
+    entrants.push_back(grid_entrant(GridCode::kFloatScalar, resolution));
     entrants.push_back(grid_entrant(GridCode::kFloatSimd, resolution));
     entrants.push_back(grid_entrant(GridCode::kInt16Simd, resolution));
     entrants.push_back(bricks_entrant(resolution));
@@ -117,7 +117,6 @@ std::vector<Entrant> accuracy_entrants(const Model& model, bool smoke) {
     entrants.push_back(openvdb_entrant(resolution));
   }
   entrants.push_back(grid_entrant(GridCode::kInt16SimdCulled, 128));
-  entrants.push_back(grid_entrant(GridCode::kFloatScalar, 128));
   for (const double bound_percent : {0.8, 0.4, 0.2, 0.1, 0.05}) {
     if (smoke && bound_percent > 0.4) continue;
     entrants.push_back(adf_entrant(128, bound_percent));

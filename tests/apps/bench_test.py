@@ -281,12 +281,13 @@ class Smoke(SmokeRun):
             self.assertAlmostEqual(twin["answers_mean"], row["answers_mean"], delta=0.02 * row["answers_mean"])
 
     def test_scalar_vector_and_culled_grids_give_the_same_answers(self):
-        for row in self.probe_frames("grid-int16-128-simd"):
-            for other in ("grid-int16-128-simd-culled", "grid-float-128-simd", "grid-float-128-scalar"):
-                twin = self.rows("frames", peer=other, model=row["model"], work=row["work"])[0]
-                # Codes of 16 bits round: points on the rim of the band may fall to either side.
-                self.assertAlmostEqual(twin["answers_mean"], row["answers_mean"],
-                                       delta=0 if "culled" in other else 1 + 0.01 * row["answers_mean"])
+        for nodes in (64, 128):
+            for row in self.probe_frames(f"grid-int16-{nodes}-simd"):
+                for other in (f"grid-int16-{nodes}-simd-culled", f"grid-float-{nodes}-simd", f"grid-float-{nodes}-scalar"):
+                    twin = self.rows("frames", peer=other, model=row["model"], work=row["work"])[0]
+                    # Codes of 16 bits round: points on the rim of the band may fall to either side.
+                    self.assertAlmostEqual(twin["answers_mean"], row["answers_mean"],
+                                           delta=0 if "culled" in other else 1 + 0.01 * row["answers_mean"])
 
     def test_leaving_out_blocks_of_points_leaves_out_no_answer(self):
         for row in self.probe_frames("grid-float-128-simd"):
