@@ -520,6 +520,9 @@ class Smoke(SmokeRun):
         self.assertEqual(float(rows["curves", curve["model"], "probes", "sqmap-layer3", "y_spread.1.upper"]),
                          curve["y_spread"][1]["upper"])
 
+    def compare(self, *files):
+        return subprocess.run([sys.executable, "-B", COMPARE, *files], capture_output=True, text=True, check=False)
+
     def test_compare_finds_a_slower_frame_and_only_that(self):
         before, after = self.folder / "a.json", self.folder / "b.json"
         steady = json.loads(self.files["results.json"])
@@ -531,21 +534,45 @@ class Smoke(SmokeRun):
             slower["frames"][0]["us"][key] *= 10
         after.write_text(json.dumps(slower), encoding="utf-8")
 
-        def compare(*files):
-            return subprocess.run([sys.executable, "-B", COMPARE, *files], capture_output=True, text=True, check=False)
-
-        same, worse, better = compare(before, before), compare(before, after), compare(after, before)
+        same, worse, better = self.compare(before, before), self.compare(before, after), self.compare(after, before)
         self.assertEqual((same.returncode, worse.returncode, better.returncode), (0, 1, 0))
         self.assertEqual(worse.stdout.count(" slower"), 1)
         self.assertIn("10.000", worse.stdout)
         self.assertEqual(better.stdout.count(" faster"), 1)
-        self.assertEqual(compare(before, COMPARE).returncode, 4)
+        self.assertEqual(self.compare(before, COMPARE).returncode, 4)
         slower = json.loads(json.dumps(steady))
         slower["budgets"][0]["mean_error_percent"] *= 2
         after.write_text(json.dumps(slower), encoding="utf-8")
-        less_accurate = compare(before, after)
+        less_accurate = self.compare(before, after)
         self.assertEqual(less_accurate.returncode, 1)
         self.assertEqual(less_accurate.stdout.count(" worse"), 1)
+
+    def test_compare_marks_curves_builds_and_bakes_only_where_their_spreads_part(self):
+        before, after = self.folder / "a.json", self.folder / "b.json"
+        steady = json.loads(self.files["results.json"])
+        for spread in spreads_in(steady):
+            spread["lower"], spread["upper"] = 0.8 * spread["median"], 1.25 * spread["median"]
+        before.write_text(json.dumps(steady), encoding="utf-8")
+
+        def marks(spreads_of, factor, count=3):
+            changed = json.loads(json.dumps(steady))
+            for spread in spreads_of(changed):
+                spread.update({part: factor * spread[part] for part in ("lower", "median", "upper")}, count=count)
+            after.write_text(json.dumps(changed), encoding="utf-8")
+            done = self.compare(before, after)
+            self.assertEqual(done.returncode, int(" slower" in done.stdout), done.stderr)
+            return done.stdout.count(" slower"), done.stdout.count(" faster")
+
+        def curve(figure):
+            return lambda results: next(row for row in results["curves"] if row["figure"] == figure)["y_spread"]
+
+        def build(results):
+            return [results["peers"][0]["build_s_spread"]]
+
+        for spreads_of in (curve("14a"), curve("objects-build"), build, lambda results: [results["bake"][0]["seconds_spread"]]):
+            self.assertEqual([marks(spreads_of, factor) for factor in (1.5, 1.6, 1 / 1.6)], [(0, 0), (1, 0), (0, 1)])
+        self.assertEqual([marks(curve("14c"), factor) for factor in (1.6, 1 / 1.6)], [(0, 1), (1, 0)])  # a rate
+        self.assertEqual(marks(build, 10, count=1), (0, 0))  # timed once
 
 
 class Draw(SmokeRun):
