@@ -57,6 +57,13 @@ inline constexpr float kBack = -0.5F, kNearShare = 0.1F;
 /// Rings of eight cells, 2^ring cells away, around a foot whose cell bounds no patch.
 inline constexpr int kRings = 4;
 
+/// The direction of v, however long: normalized() loses it where the square of the length does not fit a
+/// float. Zero where v is.
+inline Vec3f direction_of(const Vec3f& v) noexcept {
+  const float most = greater(greater(std::abs(v.x), std::abs(v.y)), std::abs(v.z));
+  return most > 0 ? normalized(Vec3f{v.x / most, v.y / most, v.z / most}) : Vec3f{};
+}
+
 /// Layer 1: F(p) <= 1 (FORMAT.md S1), from powers of the unit coordinates.
 inline bool in_superquadric(const PartRecord& part, const Vec3f& p) noexcept {
   const float x = std::abs(p.x) * part.inverse_axes.x, y = std::abs(p.y) * part.inverse_axes.y,
@@ -139,7 +146,7 @@ class Chart {
   Vec3f patch_normal(const Cell& cell, float row, float col, std::uint32_t stride) const noexcept {
     const float last = static_cast<float>(part_.rows - 1);
     const Patch patch = patch_at(cell, lesser(greater(row, kBesidePole), last - kBesidePole), col, stride);
-    return normalized(cross(patch.col, patch.row));
+    return direction_of(cross(patch.col, patch.row));
   }
   Vec3f place(float row, float col, float depth) const noexcept {
     const SurfaceSample<float> r = table_.sample(row, col);
@@ -473,7 +480,7 @@ inline void Chart::third_layer(const Vec3f& p, std::uint32_t stride, ChartAnswer
   const Vec3f out = answer.inside ? point - p : p - point;
   if (dot(out, answer.normal) < kBack * answer.distance &&
       answer.distance > kNearShare * far_from(part_, stride))
-    answer.normal = normalized(out);
+    answer.normal = direction_of(out);
   if (stride == 1) vertex_fan(p, cell, answer);
 }
 
@@ -499,7 +506,7 @@ inline bool Chart::vertex_fan(const Vec3f& p, const Cell& cell, ChartAnswer& ans
     if (square < best_square) {
       best_square = square;
       answer.surface = nearest;
-      answer.normal = normalized(cross(b - a, apex - a));
+      answer.normal = direction_of(cross(b - a, apex - a));
     }
   }
   answer.distance = std::sqrt(best_square);

@@ -60,6 +60,12 @@ HWY_INLINE V inverse_length(const V3& a) {
   return hn::IfThenElseZero(hn::Gt(length, hn::Zero(kD)), all(1.0F) / length);
 }
 HWY_INLINE V3 normalized3(const V3& a) { return inverse_length(a) * a; }
+/// direction_of() of chart.hpp.
+HWY_INLINE V3 direction3(const V3& v) {
+  const V longest = most(most(hn::Abs(v.x), hn::Abs(v.y)), hn::Abs(v.z));
+  const V divisor = pick(hn::Gt(longest, hn::Zero(kD)), longest, all(1.0F));
+  return normalized3({v.x / divisor, v.y / divisor, v.z / divisor});
+}
 HWY_INLINE V3 rotated(const Rotation<float>& r, const V3& v) {
   return {dot3(all(r.row[0]), v), dot3(all(r.row[1]), v), dot3(all(r.row[2]), v)};
 }

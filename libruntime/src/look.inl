@@ -127,7 +127,7 @@ class Looker {
   }
   SQMAP_KERNEL V3 patch_normal(const VCell& cell, V row, V col) const noexcept {
     const VPatch patch = patch_at(cell, limited(row, all(kBesidePole), all(last_row_ - kBesidePole)), col);
-    return normalized3(cross3(patch.col, patch.row));
+    return direction3(cross3(patch.col, patch.row));
   }
   /// Chart::offset.
   SQMAP_KERNEL V offset(V row, V col, float edge) const noexcept;

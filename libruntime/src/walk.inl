@@ -393,7 +393,7 @@ HWY_NOINLINE void Walker::end(const Walk& walk, VI entry, M lanes) noexcept {
   const V distance = hn::Sqrt(walk.square);
   V3 normal{hn::Zero(kD), hn::Zero(kD), hn::Zero(kD)};
   if (wants_.normal) {
-    normal = normalized3(walk.normal);
+    normal = direction3(walk.normal);
     const M beside_pole =
         hn::Or(hn::Lt(walk.row, all(kBesidePole)), hn::Gt(walk.row, all(looker_.last_row() - kBesidePole)));
     if (!none(hn::And(lanes, beside_pole))) {
@@ -405,7 +405,7 @@ HWY_NOINLINE void Walker::end(const Walk& walk, VI entry, M lanes) noexcept {
     const V3 out = pick(inside, walk.point - walk.p, walk.p - walk.point);
     M turned = hn::Lt(dot3(out, normal), all(kBack) * distance);
     turned = hn::And(turned, hn::Gt(distance, all(kNearShare * Chart::far_from(part_, looker_.stride()))));
-    if (!none(hn::And(turned, lanes))) normal = pick(turned, normalized3(out), normal);
+    if (!none(hn::And(turned, lanes))) normal = pick(turned, direction3(out), normal);
   }
   write(entry, lanes, walk.row, walk.col, walk.on_rim, distance, walk.point, normal);
 }
