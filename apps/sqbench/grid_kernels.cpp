@@ -2,8 +2,6 @@
 #include "grid_kernels.hpp"
 
 #include <array>
-#include <bit>
-#include <cstring>
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "grid_kernels.cpp"

@@ -99,7 +99,6 @@ class Chart {
   /// `table`: the part's, unpacked; it must live as long as the chart.
   Chart(const Resident& resident, const PartRecord& part, const ShapeTable<float>& table) noexcept
       : resident_(resident), part_(part), table_(table) {}
-  const ShapeTable<float>& table() const noexcept { return table_; }
 
   /// Layers 2 and 3 for a point inside the superquadric. edge > 0: also the offset for faces with such edges.
   ChartAnswer look(const Vec3f& p, bool third, std::uint32_t level, float edge) const noexcept;

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // The batched engine: the same question as Object::query for many points, compiled once for each instruction
-// set of SimdTarget. packing.inl, lanes.inl: tables and powers on vectors; look.inl: layer 2; walk.inl,
-// fans.inl: layer 3; cull.inl: bounding balls and layer 1; bounds.inl: bounds of the surface; batch.inl: the
-// pipeline; body.inl: bodies and their contacts.
+// set of SimdTarget. packing.inl: the lanes of a mask; lanes.inl: tables and powers on vectors; look.inl:
+// layer 2; walk.inl, fans.inl: layer 3; cull.inl: bounding balls and layer 1; bounds.inl: bounds of the
+// surface; batch.inl: the pipeline; body.inl: bodies and their contacts.
 #pragma once
 
 #include <cmath>

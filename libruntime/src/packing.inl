@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // Moves the lanes of a mask to the front of a vector. Included once for each target, where hn is Highway's
-// namespace for it; needs <array>, <bit>, <cstdint> and <cstring>. sqbench's grids use it, too: a rival whose
+// namespace for it; needs <array> and <cstdint>. sqbench's grids use it, too: a rival whose
 // vectors are packed worse would be beaten unfairly.
 
 #if HWY_TARGET > HWY_AVX3  // no AVX-512
