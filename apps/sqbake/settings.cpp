@@ -106,6 +106,10 @@ Outcome apply_conservative(AssetOptions& options, std::string_view text) {
   return choose<bool>(text, kSwitchNames, options.bake.conservative);
 }
 
+Outcome apply_taper(AssetOptions& options, std::string_view text) {
+  return choose<bool>(text, kSwitchNames, options.bake.fit.taper);
+}
+
 Outcome apply_timeout(AssetOptions& options, std::string_view text) {
   const Result<double> seconds = parse_duration(text);
   if (!seconds) return seconds.error();
@@ -148,11 +152,12 @@ std::string default_max_error() { return max_error_text(kDefaults.bake); }
 std::string default_max_parts() { return max_parts_text(kDefaults.bake); }
 std::string default_max_bytes() { return max_bytes_text(kDefaults.bake); }
 std::string default_conservative() { return name_of<bool>(kDefaults.bake.conservative, kSwitchNames); }
+std::string default_taper() { return name_of<bool>(kDefaults.bake.fit.taper, kSwitchNames); }
 std::string default_timeout() { return fmt::format("{}s", kDefaults.timeout_s); }
 std::string default_memory() { return "machine"; }
 std::string default_fallback() { return name_of<Fallback>(kDefaults.fallback, kFallbackNames); }
 
-constexpr std::array<Setting, 11> kSettings{{
+constexpr std::array<Setting, 12> kSettings{{
     {"unit", "UNIT", "Unit of the coordinates: m, cm, mm, um, in, ft or a number of metres", default_unit,
      apply_unit},
     {"up", "AXIS", "Axis of the input that points up: x, y, z; turned to z", default_up, apply_up},
@@ -173,6 +178,9 @@ constexpr std::array<Setting, 11> kSettings{{
     {"conservative", "on|off",
      "Also store bounds of the surface, which tell what is surely inside or outside;\nneeds a closed mesh",
      default_conservative, apply_conservative},
+    {"taper", "on|off",
+     "Taper superquadrics where that saves bytes at the target error; takes about\ntwice as long to fit",
+     default_taper, apply_taper},
     {"timeout", "TIME", "End the bake of a mesh after this time: 90s, 5m, 2h or none", default_timeout,
      apply_timeout},
     {"memory", "BYTES",

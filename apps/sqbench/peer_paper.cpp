@@ -81,7 +81,8 @@ class PaperPart {
       : fine_(1 << subdivisions), rows_((rows - 1) * fine_ + 1), cols_(cols * fine_) {
     const Part& part = model.asset.parts[index];
     const Superquadric& shape = part.shape;
-    shape_ = {cast<float>(shape.semi_axes_m), static_cast<float>(shape.e1), static_cast<float>(shape.e2)};
+    shape_ = {cast<float>(shape.semi_axes_m), static_cast<float>(shape.e1), static_cast<float>(shape.e2),
+              static_cast<float>(shape.taper)};
     turn_ = rotation<float>(part.object_from_part.orientation);
     centre_m_ = cast<float>(part.object_from_part.translation_m);
     radius_m_ = static_cast<float>(bounding_radius_m(shape) * 1.00001);
@@ -235,8 +236,7 @@ class PaperPart {
   /// The square of I_S, (19), which orders nodes alike.
   float collinearity(const Vec3f& m, std::int32_t row, std::int32_t col) const noexcept {
     const SuperellipsePoint<float>&e = eta(row), &o = omega(col);
-    const Vec3f n{e.c_power * o.c_power / shape_.semi_axes_m.x, e.c_power * o.s_power / shape_.semi_axes_m.y,
-                  e.s_power / shape_.semi_axes_m.z};
+    const Vec3f n = sqmap::surface_gradient(shape_, e, o);
     const Vec3f line = sqmap::surface_point(shape_, e, o) - m;
     const float product = dot(n, line), length = dot(n, n) * dot(line, line);
     return length > 0 ? product * product / length : 1;

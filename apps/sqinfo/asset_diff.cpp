@@ -130,6 +130,7 @@ void compare_parts(Comparison& compare, const Part& a, const Part& b) {
   compare.point("semi-axes_m", a.shape.semi_axes_m, b.shape.semi_axes_m);
   compare.plain("e1", a.shape.e1, b.shape.e1);
   compare.plain("e2", a.shape.e2, b.shape.e2);
+  compare.plain("taper", a.shape.taper, b.shape.taper);
   compare.orientation(a.object_from_part.orientation, b.object_from_part.orientation);
   compare.point("translation_m", a.object_from_part.translation_m, b.object_from_part.translation_m);
   compare.sphere("sphere", a.sphere, b.sphere);

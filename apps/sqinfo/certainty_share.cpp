@@ -21,7 +21,7 @@ std::optional<CertaintyShare> certainty_share(const Asset& asset, const runtime:
   double volume = 0, outside = 0, inside = 0;
   for (const Part& part : asset.parts) {
     share.bytes += part.bounds.cell.size() * sizeof(BoundCell);
-    const Vec3d& a = part.shape.semi_axes_m;
+    const Vec3d a = half_extents_m(part.shape);
     const double weight = a.x * a.y * a.z;
     const Rotation<double> turn = rotation(part.object_from_part.orientation);
     for (int k = 0; k < kPoints; ++k) {

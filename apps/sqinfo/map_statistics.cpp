@@ -7,12 +7,6 @@
 
 namespace sqmap::apps {
 
-double superquadric_volume_m3(const Superquadric& shape) {
-  const Vec3d& a = shape.semi_axes_m;
-  return 2 * a.x * a.y * a.z * shape.e1 * shape.e2 * std::beta(shape.e1 / 2 + 1, shape.e1) *
-         std::beta(shape.e2 / 2, shape.e2 / 2);
-}
-
 MapStatistics statistics(const DistanceMap& map) {
   MapStatistics result;
   double sum_m = 0;

@@ -7,10 +7,6 @@
 
 namespace sqmap::apps {
 
-/// Volume of a superquadric [m^3]: 2 a1 a2 a3 e1 e2 B(e1/2 + 1, e1) B(e2/2, e2/2) (Jaklic, Leonardis, Solina
-/// 2000).
-double superquadric_volume_m3(const Superquadric& shape);
-
 /// What the codes of one distance map add up to. Depths over the nodes that hit and do not start inside.
 struct MapStatistics {
   std::size_t hits{}, misses{}, start_inside{};

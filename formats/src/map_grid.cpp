@@ -47,7 +47,7 @@ SuperellipsePoint<double> mirrored(SuperellipsePoint<double> p, bool flip_c, boo
 }  // namespace
 
 std::vector<SuperellipsePoint<double>> quadrant_nodes(double alpha_m, double beta_m, double e,
-                                                      std::uint32_t cells) {
+                                                      std::uint32_t cells, double taper) {
   assert(alpha_m > 0 && beta_m > 0 && cells >= 1);
   const Directions& directions = Directions::all();
   std::vector<double> length(kArcSamples + 1);
@@ -55,7 +55,7 @@ std::vector<SuperellipsePoint<double>> quadrant_nodes(double alpha_m, double bet
   for (int k = 1; k <= kArcSamples; ++k) {
     const double cosine = directions.cosine[k], sine = directions.sine[k];
     const double n = superellipse_norm<double>(cosine, sine, e);
-    const double next_c = alpha_m * cosine / n, next_s = beta_m * sine / n;
+    const double next_c = alpha_m * cosine / n * (1 + taper * (sine / n)), next_s = beta_m * sine / n;
     length[k] = length[k - 1] + std::hypot(next_c - c, next_s - s);
     c = next_c;
     s = next_s;
@@ -80,14 +80,18 @@ MapGrid::MapGrid(const Superquadric& shape, std::uint32_t rows, std::uint32_t co
       rows_(rows),
       cols_(cols),
       eta_(quadrant_nodes(std::sqrt(shape.semi_axes_m.x * shape.semi_axes_m.y), shape.semi_axes_m.z, shape.e1,
-                          (rows - 1) / 2)),
+                          (rows - 1) / 2, shape.taper)),
       omega_(quadrant_nodes(shape.semi_axes_m.x, shape.semi_axes_m.y, shape.e2, cols / 4)) {
   assert(rows >= 3 && rows % 2 == 1 && cols >= 4 && cols % 4 == 0);
+  if (shape.taper != 0)
+    eta_below_ = quadrant_nodes(std::sqrt(shape.semi_axes_m.x * shape.semi_axes_m.y), shape.semi_axes_m.z,
+                                shape.e1, (rows - 1) / 2, -shape.taper);
 }
 
 SuperellipsePoint<double> MapGrid::eta(std::uint32_t row) const noexcept {
   const std::uint32_t equator = (rows_ - 1) / 2;
-  return row < equator ? mirrored(eta_[equator - row], false, true) : eta_[row - equator];
+  if (row >= equator) return eta_[row - equator];
+  return mirrored((eta_below_.empty() ? eta_ : eta_below_)[equator - row], false, true);
 }
 
 SuperellipsePoint<double> MapGrid::omega(std::uint32_t col) const noexcept {

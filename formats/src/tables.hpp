@@ -53,6 +53,7 @@ enum TableId : std::size_t {
   kBoundCells,
   kBoundTolerance,
   kBounds,
+  kTaper,
   kTableCount
 };
 inline constexpr std::array<ArraySpec, kTableCount> kTables{{
@@ -80,6 +81,7 @@ inline constexpr std::array<ArraySpec, kTableCount> kTables{{
     {"maps", "bound_cells", Element::kU32, 1},
     {"maps", "bound_tolerance_m", Element::kF64, 1},
     {"maps", "bounds", Element::kU8, 6},
+    {"parts", "taper", Element::kF64, 1},
 }};
 
 /// Attributes of numbers, in the order of the content hash.

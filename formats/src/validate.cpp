@@ -169,6 +169,11 @@ class Checker {
         in_range(shape.e1, kMinExponent, kMaxExponent) && in_range(shape.e2, kMinExponent, kMaxExponent), 21,
         "exponents " + text(shape.e1) + ", " + text(shape.e2) + ", must be " + text(kMinExponent) + " to " +
             text(kMaxExponent));
+    // Of exponents that rule 21 refuses it says nothing.
+    if (in_range(shape.e1, kMinExponent, kMaxExponent))
+      require_part(std::abs(shape.taper) <= max_taper(shape.e1), 29,
+                   "taper = " + text(shape.taper) + ", must be within " + text(max_taper(shape.e1)) +
+                       " of 0: a superquadric of e1 = " + text(shape.e1) + " is not convex beyond it");
     const Quaternion& q = part.object_from_part.orientation;
     const double length = std::sqrt(q.w * q.w + q.x * q.x + q.y * q.y + q.z * q.z);
     require_part(in_range(length, 1 - kUnitTolerance, 1 + kUnitTolerance), 22,

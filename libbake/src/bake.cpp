@@ -215,7 +215,7 @@ struct Drawn {
 /// The maps that the target asks for. What they lose beside seams, where one chart ends and the next has not
 /// begun, shows only between parts: as long as the error of the whole exceeds the target, and finer maps
 /// lower it enough, they are drawn for a stricter one.
-Result<Drawn> draw_maps(Asset& asset, const std::vector<double>& areas_m2, const MeshQueries& queries,
+Result<Drawn> draw_maps(Asset& asset, MapDrawer& drawer, std::size_t most_shapes, const MeshQueries& queries,
                         const MapTarget& target, std::uint64_t seed) {
   const ShellPoints shell = sample_shell(queries, kShellWidth * asset.r_max_m, kShellPoints, seed);
   std::vector<Part> best;
@@ -223,9 +223,9 @@ Result<Drawn> draw_maps(Asset& asset, const std::vector<double>& areas_m2, const
   bool by_budget = false;
   MapTarget asked = target;
   double share = 1;  // of the target before
-  MapDrawer drawer(asset.parts, areas_m2, queries);
   for (int round = 0; round < kMapRounds; ++round) {
-    const bool budget_decided = drawer.draw(asset.parts, asked);
+    const bool budget_decided = drawer.draw(asset.parts, asked, most_shapes);
+    asset.sphere = enclosing_sphere(asset.parts);
     tbb::parallel_for(std::size_t{0}, asset.parts.size(), [&](std::size_t k) {
       add_vertex_samples(asset.parts[k], queries, kVertexTolerance * target.error_m);
     });
@@ -249,6 +249,7 @@ Result<Drawn> draw_maps(Asset& asset, const std::vector<double>& areas_m2, const
     asked.error_m *= share;
   }
   asset.parts = std::move(best);
+  asset.sphere = enclosing_sphere(asset.parts);
   return Drawn{depth_in_aims, by_budget};
 }
 
@@ -262,8 +263,53 @@ Asset with_quick_fits(const Asset& asset, const std::vector<Piece>& pieces) {
     part.face_count = asset.parts[k].face_count;
     quick.parts[k] = std::move(part);
   }
-  quick.sphere = enclosing_sphere(quick.parts);
   return quick;
+}
+
+/// The shapes that each part of the asset may have: its own and, where there is one, the tapered one.
+std::vector<std::vector<PlacedShape>> shapes_of(const Asset& asset, const std::vector<Piece>& pieces) {
+  std::vector<std::vector<PlacedShape>> shapes;
+  for (std::size_t k = 0; k < pieces.size(); ++k) {
+    std::vector<PlacedShape>& of_part = shapes.emplace_back();
+    of_part.push_back({asset.parts[k].shape, asset.parts[k].object_from_part});
+    if (const auto& tapered = pieces[k].tapered)
+      of_part.push_back({tapered->part.shape, tapered->part.object_from_part});
+  }
+  return shapes;
+}
+
+/// Of the maps in memory, but for what depends on the number of parts alone.
+std::size_t map_bytes(const Asset& asset) {
+  std::size_t bits = 0;
+  for (const Part& part : asset.parts) {
+    const DistanceMap& map = part.map;
+    bits += map.code.size() * (map.bits + (map.start_inside.empty() ? 0 : 1)) + 48 * map.crossings.size() +
+            64 * map.vertex_samples.size();
+  }
+  return bits / 8;
+}
+
+/// The maps of the parts' first shapes; or with tapers, where those meet the target as well in fewer bytes.
+Result<Drawn> draw_smallest(Asset& asset, const std::vector<Piece>& pieces,
+                            const std::vector<double>& areas_m2, const MeshQueries& queries,
+                            const MapTarget& target, std::uint64_t seed) {
+  const std::vector<std::vector<PlacedShape>> shapes = shapes_of(asset, pieces);
+  MapDrawer drawer(shapes, areas_m2, queries);
+  auto drawn = draw_maps(asset, drawer, 1, queries, target, seed);
+  const bool have_tapers =
+      std::any_of(shapes.begin(), shapes.end(), [](const auto& s) { return s.size() > 1; });
+  if (!drawn || !have_tapers) return drawn;
+  Asset other = asset;
+  auto redrawn = draw_maps(other, drawer, 2, queries, target, seed);
+  if (!redrawn) return redrawn;
+  const Drawn &rigid = drawn.value(), &tapered = redrawn.value();
+  const bool meets = tapered.depth_in_aims <= std::max(rigid.depth_in_aims, 1.0);
+  // Where the budget decides, bytes are the same and errors differ.
+  const bool gains = rigid.by_budget ? tapered.depth_in_aims < rigid.depth_in_aims
+                                     : !tapered.by_budget && map_bytes(other) < map_bytes(asset);
+  if (!meets || !gains) return drawn;
+  asset = std::move(other);
+  return redrawn;
 }
 
 Provenance provenance(const SourceMesh& source, const BakeOptions& options) {
@@ -338,18 +384,17 @@ Result<BakeResult> bake(const SourceMesh& source, const BakeOptions& asked, cons
     asset.parts.push_back(piece.part);
     result.fits.push_back(piece.fit);
   }
-  asset.sphere = enclosing_sphere(asset.parts);
   const std::vector<std::uint16_t> owner = owners(pieces, fine, prepared.mesh.faces.size());
   count_members(asset.parts, prepared.mesh, owner);
   asset.face_labels = label_input_faces(owner, prepared.mesh, source.source_face_count);
   const double target_m = options.max_error_percent / 100 * r_max_m;
   const MapTarget target{target_m, options.max_bytes};
   const std::vector<double> areas_m2 = surface_areas(pieces, fine);
-  auto drawn = draw_maps(asset, areas_m2, queries, target, options.seed);
+  auto drawn = draw_smallest(asset, pieces, areas_m2, queries, target, options.seed);
   if (!drawn) return drawn.error();
   if (result.stopped_by == "target" && !drawn.value().by_budget && drawn.value().depth_in_aims > 1) {
     Asset quick = with_quick_fits(asset, pieces);
-    auto redrawn = draw_maps(quick, areas_m2, queries, target, options.seed);
+    auto redrawn = draw_smallest(quick, pieces, areas_m2, queries, target, options.seed);
     if (!redrawn) return redrawn.error();
     if (redrawn.value().depth_in_aims < drawn.value().depth_in_aims) {
       asset.parts = std::move(quick.parts);
@@ -358,6 +403,8 @@ Result<BakeResult> bake(const SourceMesh& source, const BakeOptions& asked, cons
       for (std::size_t k = 0; k < pieces.size(); ++k) result.fits[k] = pieces[k].quick->fit;
     }
   }
+  for (std::size_t k = 0; k < pieces.size(); ++k)
+    if (asset.parts[k].shape.taper != 0) result.fits[k] = pieces[k].tapered->fit;
   if (drawn.value().by_budget) result.stopped_by = "bytes";
   asset.mesh = prepared.record;
   asset.provenance = provenance(source, asked);

@@ -47,7 +47,9 @@ constexpr double kAsGood = 0.02;
 constexpr double kOnSurface = 1e-4;
 constexpr double kNearSurface = 0.02;
 /// Through fewer points than this pass superquadrics that say nothing about the part (any 11 have one).
-constexpr std::size_t kDetermined = std::size_t{3} * fit::kParameterCount;
+constexpr std::size_t kDetermined = std::size_t{3} * fit::kRigidCount;
+/// Tapers are kept below this share of max_taper: at all of it the surface has a crease of no curvature.
+constexpr double kMostTaper = 0.9;
 /// What the corners that no point samples may add to the log-volume of the smallest bound.
 constexpr double kUnsampled = 0.2;
 
@@ -61,6 +63,8 @@ Bounds make_bounds(const FitOptions& options) {
   bounds.upper.segment<3>(fit::kLogAxes).setConstant(std::log(8.0));
   bounds.lower.segment<2>(fit::kE1).setConstant(options.min_exponent);
   bounds.upper.segment<2>(fit::kE1).setConstant(options.max_exponent);
+  bounds.upper[fit::kTaper] = options.taper ? kMostTaper : 0;
+  bounds.lower[fit::kTaper] = -bounds.upper[fit::kTaper];
   return bounds;
 }
 
@@ -250,12 +254,6 @@ const char* fit_stop_name(FitStop stop) noexcept {
       return "iterations";
   }
   return "unknown";
-}
-
-double volume_m3(const Superquadric& shape) {
-  const auto beta = [](double x, double y) { return std::tgamma(x) * std::tgamma(y) / std::tgamma(x + y); };
-  return 2 * shape.semi_axes_m.x * shape.semi_axes_m.y * shape.semi_axes_m.z * shape.e1 * shape.e2 *
-         beta(shape.e1 / 2 + 1, shape.e1) * beta(shape.e2 / 2, shape.e2 / 2);
 }
 
 Result<Fit> fit_superquadric(std::span<const Vec3d> points_m, const FitOptions& options) {

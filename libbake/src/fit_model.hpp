@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// The model that fit.cpp optimises: a rigid superquadric, its 11 parameters, and the derivatives of log beta
+// The model that fit.cpp optimises: a superquadric, its 12 parameters, and the derivatives of log beta
 // and of the log-volume. Lengths are those of the normalised frame of fit.cpp (the set's half-extent is about
 // 1).
 #pragma once
@@ -15,8 +15,18 @@
 
 namespace sqmap::bake::fit {
 
-/// Layout of a parameter vector: centre, rotation vector, logarithms of the semi-axes, exponents.
-enum Parameter : int { kCentre = 0, kTurn = 3, kLogAxes = 6, kE1 = 9, kE2 = 10, kParameterCount = 11 };
+/// Layout of a parameter vector: centre, rotation vector, logarithms of the semi-axes, exponents, taper as a
+/// share of max_taper(e1). The first kRigidCount make a rigid superquadric.
+enum Parameter : int {
+  kCentre = 0,
+  kTurn = 3,
+  kLogAxes = 6,
+  kE1 = 9,
+  kE2 = 10,
+  kRigidCount = 11,
+  kTaper = 11,
+  kParameterCount = 12
+};
 using Vector = Eigen::Matrix<double, kParameterCount, 1>;
 using Matrix = Eigen::Matrix<double, kParameterCount, kParameterCount>;
 
@@ -29,6 +39,7 @@ struct Placed {
 
 struct Bounds {
   Vector lower, upper;
+  bool is_rigid() const noexcept { return !(lower[kTaper] < upper[kTaper]); }
 };
 
 /// The parameter vector of `at`; its rotation vector, which counts from at.part_axes, is zero.
@@ -52,10 +63,16 @@ class LogBetaModel {
   LogBeta value_and_gradient(const Vec3d& point) const noexcept;
 
  private:
+  /// log beta by log u, log |w| (u across the axis, w along it, both over the semi-axes), by w where it
+  /// stands for itself, by e1 and by the taper.
+  struct Meridian {
+    double value, by_u, by_v, by_w, by_e, by_taper;
+  };
   Eigen::Vector3d local(const Vec3d& point) const noexcept;
+  Meridian meridian(double log_u, double log_w, double sign) const noexcept;
 
   Eigen::Vector3d centre_, log_axes_;
-  double e1_, e2_;
+  double e1_, e2_, share_, taper_;
   Eigen::Matrix3d axes_;           // columns: the part's axes
   Eigen::Matrix3d turn_jacobian_;  // of the rotation by its vector, in the part's frame
 };

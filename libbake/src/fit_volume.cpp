@@ -85,7 +85,11 @@ Vector damped_step(const Objective& model, const Vector& x, const Bounds& bounds
     hessian(i, i) = 1;
     descent[i] = 0;
   }
-  return hessian.ldlt().solve(descent);
+  if (!bounds.is_rigid()) return hessian.ldlt().solve(descent);
+  Vector step = Vector::Zero();
+  step.head<kRigidCount>() =
+      hessian.topLeftCorner<kRigidCount, kRigidCount>().ldlt().solve(descent.head<kRigidCount>());
+  return step;
 }
 
 /// Adds to `iterations`.

@@ -9,6 +9,8 @@
 
 #include <tbb/parallel_for.h>
 
+#include "part_builder.hpp"
+
 namespace sqmap::bake {
 
 namespace {
@@ -38,9 +40,11 @@ struct Strided {
   double error_m;  ///< what it loses, the other direction kept as it is
 };
 
-/// A traced part with what coarser maps of it would lose. The losses of both directions add.
+/// A traced shape of a part with what coarser maps of it would lose. The losses of both directions add.
 struct Candidate {
-  std::optional<Quadrant> cells;  ///< empty: not yet traced
+  PlacedShape placed;
+  Quadrant wanted;
+  std::optional<Quadrant> cells;  ///< of the field; empty: not yet traced
   RayField field;
   std::vector<Strided> rows, cols;
   double own_error_m{};  ///< of the field itself, foretold from its coarser halves
@@ -48,7 +52,7 @@ struct Candidate {
 };
 
 struct Choice {
-  std::size_t row{}, col{};
+  std::size_t candidate{}, row{}, col{};
   double error_m{}, bytes{};
 };
 
@@ -66,13 +70,15 @@ std::vector<Strided> strides(std::uint32_t quadrant_cells, ErrorAt error_at) {
   return out;
 }
 
-Candidate trace(const Part& part, const MeshQueries& queries, const Quadrant& cells) {
+Candidate trace(const PlacedShape& placed, const MeshQueries& queries, const Quadrant& cells) {
   Candidate candidate;
+  candidate.placed = placed;
+  candidate.wanted = cells;
   candidate.cells = cells;
   const std::uint32_t rows = 2 * cells.rows + 1, cols = 4 * cells.cols;
-  candidate.field = trace_map(part.shape, part.object_from_part, rows, cols, queries);
+  candidate.field = trace_map(placed.shape, placed.object_from_part, rows, cols, queries);
   const RayField& field = candidate.field;
-  const MapGrid grid(part.shape, rows, cols);
+  const MapGrid grid(placed.shape, rows, cols);
   for (const double depth_m : field.depth_m) candidate.deepest_m = std::max(candidate.deepest_m, depth_m);
   std::size_t hits = 0;
   for (std::uint32_t texel = 0; texel < rows * cols; ++texel) hits += field.has_hit(texel);
@@ -87,11 +93,15 @@ Candidate trace(const Part& part, const MeshQueries& queries, const Quadrant& ce
   return candidate;
 }
 
+/// The candidates of each part.
+using Candidates = std::vector<std::vector<Candidate>>;
+
 /// The trade of error for bytes at one target.
 class Allotment {
  public:
-  Allotment(const std::vector<Candidate>& candidates, const std::vector<double>& weights, double target_m)
-      : candidates_(candidates), weights_(weights), target_m_(target_m) {}
+  Allotment(const Candidates& candidates, const std::vector<double>& weights, double target_m,
+            std::size_t most_shapes)
+      : candidates_(candidates), weights_(weights), target_m_(target_m), most_shapes_(most_shapes) {}
 
   /// The maps of least error plus price [m a byte].
   std::vector<Choice> at(double price) const {
@@ -109,7 +119,7 @@ class Allotment {
   double stored_bytes(const std::vector<Choice>& choices) const {
     double sum = 0;
     for (std::size_t k = 0; k < choices.size(); ++k)
-      sum += 0.75 * candidates_[k].hit_share * choices[k].bytes;
+      sum += 0.75 * candidates_[k][choices[k].candidate].hit_share * choices[k].bytes;
     return sum;
   }
   std::uint32_t bits(const Candidate& candidate) const {
@@ -129,29 +139,33 @@ class Allotment {
   }
 
  private:
-  Choice choose(const Candidate& candidate, double weight, double price) const {
+  Choice choose(const std::vector<Candidate>& candidates, double weight, double price) const {
     Choice best;
     double least = std::numeric_limits<double>::infinity();
-    const double texel_bytes = bits(candidate) / 8.0;
-    for (std::size_t r = 0; r < candidate.rows.size(); ++r) {
-      for (std::size_t c = 0; c < candidate.cols.size(); ++c) {
-        const Strided &row = candidate.rows[r], &col = candidate.cols[c];
-        const double error_m = row.error_m + col.error_m + candidate.own_error_m;
-        const double rows = 2.0 * candidate.cells->rows / row.stride + 1;
-        const double bytes = rows * 4.0 * candidate.cells->cols / col.stride * texel_bytes;
-        const double cost = weight * error_m + price * bytes;
-        if (cost < least) {
-          least = cost;
-          best = {r, c, error_m, bytes};
+    for (std::size_t k = 0; k < std::min(candidates.size(), most_shapes_); ++k) {
+      const Candidate& candidate = candidates[k];
+      const double texel_bytes = bits(candidate) / 8.0;
+      for (std::size_t r = 0; r < candidate.rows.size(); ++r) {
+        for (std::size_t c = 0; c < candidate.cols.size(); ++c) {
+          const Strided &row = candidate.rows[r], &col = candidate.cols[c];
+          const double error_m = row.error_m + col.error_m + candidate.own_error_m;
+          const double rows = 2.0 * candidate.cells->rows / row.stride + 1;
+          const double bytes = rows * 4.0 * candidate.cells->cols / col.stride * texel_bytes;
+          const double cost = weight * error_m + price * bytes;
+          if (cost < least) {
+            least = cost;
+            best = {k, r, c, error_m, bytes};
+          }
         }
       }
     }
     return best;
   }
 
-  const std::vector<Candidate>& candidates_;
+  const Candidates& candidates_;
   const std::vector<double>& weights_;
   double target_m_;
+  std::size_t most_shapes_;
 };
 
 }  // namespace
@@ -159,12 +173,15 @@ class Allotment {
 struct MapDrawer::Impl {
   const MeshQueries& queries;
   std::vector<double> weights;  ///< sum 1
-  std::vector<Quadrant> wanted;
-  std::vector<Candidate> candidates;
+  Candidates candidates;
 
-  void trace_wanted(const std::vector<Part>& parts) {
-    tbb::parallel_for(std::size_t{0}, parts.size(), [&](std::size_t k) {
-      if (candidates[k].cells != wanted[k]) candidates[k] = trace(parts[k], queries, wanted[k]);
+  void trace_wanted(std::size_t most_shapes) {
+    tbb::parallel_for(std::size_t{0}, candidates.size(), [&](std::size_t k) {
+      for (std::size_t i = 0; i < std::min(candidates[k].size(), most_shapes); ++i) {
+        Candidate& candidate = candidates[k][i];
+        if (candidate.cells != candidate.wanted)
+          candidate = trace(candidate.placed, queries, candidate.wanted);
+      }
     });
   }
 
@@ -177,27 +194,30 @@ struct MapDrawer::Impl {
       any = true;
     };
     for (std::size_t k = 0; k < choices.size(); ++k) {
-      finer(wanted[k].rows, choices[k].row);
-      finer(wanted[k].cols, choices[k].col);
+      Quadrant& wanted = candidates[k][choices[k].candidate].wanted;
+      finer(wanted.rows, choices[k].row);
+      finer(wanted.cols, choices[k].col);
     }
     return any;
   }
 };
 
-MapDrawer::MapDrawer(const std::vector<Part>& parts, const std::vector<double>& area_m2,
+MapDrawer::MapDrawer(const std::vector<std::vector<PlacedShape>>& shapes, const std::vector<double>& area_m2,
                      const MeshQueries& queries)
-    : impl_(std::make_unique<Impl>(Impl{queries, {}, {}, {}})) {
+    : impl_(std::make_unique<Impl>(Impl{queries, {}, {}})) {
   const double total_m2 = std::accumulate(area_m2.begin(), area_m2.end(), 0.0);
   for (const double a : area_m2) impl_->weights.push_back(a / total_m2);
-  impl_->wanted.resize(parts.size());
-  impl_->candidates.resize(parts.size());
+  for (const std::vector<PlacedShape>& of_part : shapes) {
+    std::vector<Candidate>& candidates = impl_->candidates.emplace_back(of_part.size());
+    for (std::size_t i = 0; i < of_part.size(); ++i) candidates[i].placed = of_part[i];
+  }
 }
 
 MapDrawer::~MapDrawer() = default;
 
-bool MapDrawer::draw(std::vector<Part>& parts, const MapTarget& target) {
-  const std::vector<Candidate>& candidates = impl_->candidates;
-  const Allotment allotment(candidates, impl_->weights, target.error_m);
+bool MapDrawer::draw(std::vector<Part>& parts, const MapTarget& target, std::size_t most_shapes) {
+  const Candidates& candidates = impl_->candidates;
+  const Allotment allotment(candidates, impl_->weights, target.error_m, most_shapes);
   const auto meets_target = [&](const std::vector<Choice>& c) {
     return allotment.mean_error_m(c) <= target.error_m;
   };
@@ -207,13 +227,16 @@ bool MapDrawer::draw(std::vector<Part>& parts, const MapTarget& target) {
   std::vector<Choice> choices;
   bool by_budget = false;
   do {
-    impl_->trace_wanted(parts);
+    impl_->trace_wanted(most_shapes);
     choices = allotment.at(allotment.price_where(meets_target, true));
     by_budget = !in_budget(choices);
     if (by_budget) choices = allotment.at(allotment.price_where(in_budget, false));
   } while (impl_->want_finer(choices));
   tbb::parallel_for(std::size_t{0}, parts.size(), [&](std::size_t k) {
-    const Candidate& c = candidates[k];
+    const Candidate& c = candidates[k][choices[k].candidate];
+    parts[k].shape = c.placed.shape;
+    parts[k].object_from_part = c.placed.object_from_part;
+    parts[k].sphere = sphere_of(c.placed.shape, c.placed.object_from_part);
     parts[k].map =
         quantise(c.field, {c.rows[choices[k].row].stride, c.cols[choices[k].col].stride, allotment.bits(c)});
   });

@@ -11,6 +11,12 @@
 
 namespace sqmap::bake {
 
+/// A superquadric that a part may have.
+struct PlacedShape {
+  Superquadric shape;
+  Pose object_from_part;
+};
+
 /// What the maps of an asset should reach and may cost.
 struct MapTarget {
   double error_m;           ///< mean error over the object's surface
@@ -20,16 +26,18 @@ struct MapTarget {
 /// Draws the maps of all parts of an asset, for one target after the other: what rays met is kept.
 class MapDrawer {
  public:
-  /// Each part counts by its `area_m2` of the mesh.
-  MapDrawer(const std::vector<Part>& parts, const std::vector<double>& area_m2, const MeshQueries& queries);
+  /// shapes[k]: the superquadrics, each with its pose, that part k may have, at least one. It counts by its
+  /// `area_m2` of the mesh.
+  MapDrawer(const std::vector<std::vector<PlacedShape>>& shapes, const std::vector<double>& area_m2,
+            const MeshQueries& queries);
   ~MapDrawer();
   MapDrawer(MapDrawer&&) = delete;
 
-  /// Gives the parts, the same as before but for their maps, the maps with the fewest bytes in memory that
-  /// meet the target together. What a byte is worth is the same everywhere (one Lagrange multiplier for all
-  /// parts): a large smooth part may err more than the target so that a small rough one need not cost much,
-  /// or the other way round. True: the byte budget, not the target, decided.
-  bool draw(std::vector<Part>& parts, const MapTarget& target);
+  /// Gives each part one of its first `most_shapes` shapes, and the parts the maps with the fewest bytes in
+  /// memory that meet the target together. What a byte is worth is the same everywhere (one Lagrange
+  /// multiplier for all parts): a large smooth part may err more than the target so that a small rough one
+  /// need not cost much, or the other way round. True: the byte budget, not the target, decided.
+  bool draw(std::vector<Part>& parts, const MapTarget& target, std::size_t most_shapes);
 
  private:
   struct Impl;

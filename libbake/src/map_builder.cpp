@@ -21,12 +21,15 @@ constexpr double kReachMargin = 1.25;
 // Octant cells a side on which the medial distance is found; it is smooth, and kReachMargin covers the rest.
 constexpr std::uint32_t kReachCells = 12;
 
-/// Largest t for which the foot point of r - t n is still r, in [0, distance to the planes of symmetry].
+/// Largest t for which the foot point of r - t n is still r, in [0, distance to the planes of symmetry]; z =
+/// 0 is none of a tapered shape, which ends at z = +-a3.
 double medial_distance(const ShapeTable<double>& table, const Vec3d& r, const Vec3d& n) {
   double high = std::numeric_limits<double>::infinity();
-  for (int axis = 0; axis < 3; ++axis) {
+  for (int axis = 0; axis < 2; ++axis) {
     if (n[axis] > 1e-9) high = std::min(high, r[axis] / n[axis]);
   }
+  const double floor_m = table.taper == 0 ? 0 : std::copysign(table.axes_m.z, -n.z);
+  if (std::abs(n.z) > 1e-9) high = std::min(high, (r.z - floor_m) / n.z);
   if (!(high > 0) || !std::isfinite(high)) return 0;
   constexpr int kHalvings = 10;
   constexpr double kNearer = 0.995;  // another foot is nearer by more than the tables' error
@@ -40,18 +43,23 @@ double medial_distance(const ShapeTable<double>& table, const Vec3d& r, const Ve
   return low;
 }
 
-/// Medial distance at (row, col) of a quadrant, bilinear between the nodes it was found at.
+/// Medial distance at (row, col) of a quadrant of columns, bilinear between the nodes it was found at; rows
+/// from the equator up, and of a tapered shape down too.
 class Reach {
  public:
   Reach(const Superquadric& shape, const MapGrid& grid)
       : half_((grid.rows() - 1) / 2), quarter_(grid.cols() / 4) {
     const ShapeTable<double> table(shape, grid.rows(), grid.cols());
-    distance_m_.resize(std::size_t{kReachCells + 1} * (kReachCells + 1));
-    tbb::parallel_for(0U, kReachCells + 1, [&](std::uint32_t a) {
+    const std::uint32_t halves = shape.taper == 0 ? 1 : 2;
+    below_ = shape.taper == 0 ? 0 : kNodes;
+    distance_m_.resize(std::size_t{halves} * kNodes);
+    tbb::parallel_for(0U, halves * (kReachCells + 1), [&](std::uint32_t k) {
+      const std::uint32_t a = k % (kReachCells + 1);
+      const double up = k == a ? 1 : -1;
       for (std::uint32_t b = 0; b <= kReachCells; ++b) {
-        const SurfaceSample<double> s = table.sample(half_ + a * double(half_) / kReachCells,
+        const SurfaceSample<double> s = table.sample(half_ + up * (a * double(half_) / kReachCells),
                                                      2.0 * quarter_ + b * double(quarter_) / kReachCells);
-        distance_m_[a * (kReachCells + 1) + b] = medial_distance(table, s.point_m, s.normal);
+        distance_m_[k * (kReachCells + 1) + b] = medial_distance(table, s.point_m, s.normal);
       }
     });
   }
@@ -62,7 +70,8 @@ class Reach {
     const double v = double(along <= quarter_ ? along : 2 * quarter_ - along) / quarter_ * kReachCells;
     const auto i = std::min(static_cast<std::uint32_t>(u), kReachCells - 1);
     const auto j = std::min(static_cast<std::uint32_t>(v), kReachCells - 1);
-    const double* corner = &distance_m_[i * (kReachCells + 1) + j];
+    const std::size_t first = row < half_ ? below_ : 0;
+    const double* corner = &distance_m_[first + i * (kReachCells + 1) + j];
     const double low = corner[0] + (v - j) * (corner[1] - corner[0]);
     const double high =
         corner[kReachCells + 1] + (v - j) * (corner[kReachCells + 2] - corner[kReachCells + 1]);
@@ -70,7 +79,10 @@ class Reach {
   }
 
  private:
+  static constexpr std::size_t kNodes = std::size_t{kReachCells + 1} * (kReachCells + 1);
+
   std::uint32_t half_, quarter_;
+  std::size_t below_;  // where the nodes below the equator begin
   std::vector<double> distance_m_;
 };
 

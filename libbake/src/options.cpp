@@ -60,7 +60,7 @@ std::string BakeOptions::to_json() const {
   const auto& [policy, weld_tolerance, max_hole_edges] = repair_options;
   const auto& [source_count, window, locale_width, boundary_strength, min_hull_gain, k_h, t_h,
                use_boundary_strength, use_hyperbolic, join_components, min_part_area] = decompose_options;
-  const auto& [min_exponent, max_exponent, max_iterations, min_axis_ratio, quick] = fit_options;
+  const auto& [min_exponent, max_exponent, max_iterations, min_axis_ratio, quick, taper] = fit_options;
   nlohmann::json json = {
       {"max_error_percent", error_percent},
       {"max_error_m", error_m},
@@ -92,7 +92,9 @@ std::string BakeOptions::to_json() const {
         {"min_axis_ratio", min_axis_ratio},
         {"quick", quick}}},
   };
-  if (with_bounds) json["conservative"] = true;  // named where it decides bytes
+  // Named where they decide bytes.
+  if (taper) json["fit"]["taper"] = true;
+  if (with_bounds) json["conservative"] = true;
   return json.dump();
 }
 

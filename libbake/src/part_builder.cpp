@@ -6,6 +6,10 @@
 
 namespace sqmap::bake {
 
+BoundingSphere sphere_of(const Superquadric& shape, const Pose& object_from_part) {
+  return {object_from_part.translation_m, bounding_radius_m(shape)};
+}
+
 Result<FittedPart> fit_part(const SolidSet& set, const Cell& cell, const FitOptions& options) {
   const std::vector<Vec3d> points_m = set.points(cell.solid);
   auto fit = fit_superquadric(points_m, options);
@@ -25,7 +29,7 @@ Result<FittedPart> fit_part(const SolidSet& set, const Cell& cell, const FitOpti
   Part part;
   part.shape = fit.value().shape;
   part.object_from_part = fit.value().object_from_part;
-  part.sphere = {part.object_from_part.translation_m, bounding_radius_m(part.shape)};
+  part.sphere = sphere_of(part.shape, part.object_from_part);
   part.segment = cell.segment;
   part.reason = cell.reason;
   part.volume_m3 = set.volume_m3(cell.solid);

@@ -17,6 +17,9 @@ struct FittedPart {
   PartFit fit;
 };
 
+/// The ball around a superquadric, object frame.
+BoundingSphere sphere_of(const Superquadric& shape, const Pose& object_from_part);
+
 /// The bounding superquadric of a cell.
 Result<FittedPart> fit_part(const SolidSet& set, const Cell& cell, const FitOptions& options);
 

@@ -39,9 +39,10 @@ constexpr int kMostTrials = 4;
 /// A cell with a quick fit and a draft map, enough to judge it by.
 Result<Piece> draft_piece(const SolidSet& set, Cell cell, const MeshQueries& queries, FitOptions options) {
   options.quick = true;
+  options.taper = false;
   auto fitted = fit_part(set, cell, options);
   if (!fitted) return fitted.error();
-  Piece piece{std::move(cell), std::move(fitted.value().part), fitted.value().fit, {}, {}, 0, {}};
+  Piece piece{std::move(cell), std::move(fitted.value().part), fitted.value().fit, {}, {}, {}, 0, {}};
   draft_map(piece.part, queries, kDraftQuadrantCells);
   return piece;
 }
@@ -49,8 +50,14 @@ Result<Piece> draft_piece(const SolidSet& set, Cell cell, const MeshQueries& que
 /// Gives every piece the fit it deserves.
 Outcome fit_pieces(const SolidSet& set, std::vector<Piece>& pieces, const FitOptions& options) {
   std::vector<std::optional<Error>> errors(pieces.size());
+  FitOptions rigid = options;
+  rigid.taper = false;
   tbb::parallel_for(std::size_t{0}, pieces.size(), [&](std::size_t k) {
-    auto fitted = fit_part(set, pieces[k].cell, options);
+    if (options.taper) {
+      if (auto tapered = fit_part(set, pieces[k].cell, options))
+        pieces[k].tapered = std::move(tapered).value();
+    }
+    auto fitted = fit_part(set, pieces[k].cell, rigid);
     if (fitted) {
       pieces[k].quick = FittedPart{std::move(pieces[k].part), pieces[k].fit};
       pieces[k].quick->part.map = {};

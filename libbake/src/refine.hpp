@@ -22,7 +22,8 @@ struct Piece {
   Cell cell;
   Part part;
   PartFit fit;
-  std::optional<FittedPart> quick;  ///< what the partition was judged by, once `part` is the full fit
+  std::optional<FittedPart> quick;    ///< what the partition was judged by, once `part` is the full fit
+  std::optional<FittedPart> tapered;  ///< the full fit of FitOptions::taper
   std::optional<std::vector<HalfSpace>> cuts;  ///< planes to split it by, best first
   std::size_t cuts_tried{};                    ///< of them, those that did not pay
   std::optional<Spare> spare;                  ///< of those, the one that cost least

@@ -140,7 +140,7 @@ void cut_triangle(const std::array<Vec3d, 3>& q, std::uint32_t cells, CutSurface
 
 CutSurface cut_surface(const Part& part, const Mesh& mesh, std::uint32_t cells) {
   const Rotation<double> turn = rotation(part.object_from_part.orientation);
-  const Vec3d& a = part.shape.semi_axes_m;
+  const Vec3d a = half_extents_m(part.shape);
   std::vector<Vec3d> q;
   q.reserve(mesh.vertices_m.size());
   for (const Vec3d& vertex_m : mesh.vertices_m) {
@@ -296,7 +296,8 @@ CellMiddle middle_of(const Superquadric& shape, std::uint32_t cell, std::uint32_
   middle.direction[axis] = face % 2 == 0 ? 1 : -1;
   middle.direction[(axis + 1) % 3] = (2.0 * col + 1) / cells - 1;
   middle.direction[(axis + 2) % 3] = (2.0 * row + 1) / cells - 1;
-  const Superquadric unit{{1, 1, 1}, shape.e1, shape.e2};
+  const double narrow = 1 / (1 + std::abs(shape.taper));
+  const Superquadric unit{{narrow, narrow, 1}, shape.e1, shape.e2, shape.taper};
   middle.top = kBoundSteps * kBoundReach / inside_outside_radial(unit, middle.direction);
   const Vec3d n = normal_at(unit, middle.direction);
   middle.plane = {dot(n, middle.direction), n[(axis + 1) % 3] / cells, n[(axis + 2) % 3] / cells};
@@ -337,7 +338,7 @@ SurfaceBounds bound_surface(const Part& part, const BoundingSphere& around, cons
     const auto is_inside = [&](double height) {
       // Any direction serves; this one lies in no plane that models are aligned with.
       const Vec3d direction = normalized(Vec3d{0.3217, 0.5431, 0.7757});
-      const Vec3d& a = part.shape.semi_axes_m;
+      const Vec3d a = half_extents_m(part.shape);
       const Vec3d q = (height / kBoundSteps) * middle.direction;
       const Vec3d p_m =
           turn.apply(Vec3d{a.x * q.x, a.y * q.y, a.z * q.z}) + part.object_from_part.translation_m;

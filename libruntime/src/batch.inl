@@ -19,8 +19,7 @@ class Charts {
     held_[slot] = part;
     Tables& tables = tables_[slot];
     resident_.unpack(resident_.part(part), tables.shape);
-    tables.eta.set(tables.shape.eta);
-    tables.omega.set(tables.shape.omega);
+    tables.set_cells();
     return tables;
   }
 
@@ -302,7 +301,7 @@ HWY_NOINLINE void Answerer::hand_over(Findings& findings) noexcept {
 
 // What Object promises of the stack; the rest is a few vectors that did not fit registers.
 static_assert(sizeof(Answerer) + sizeof(Walker) + sizeof(Chunk) + sizeof(Findings) + sizeof(EntryList) <=
-              std::size_t{384} * 1024);
+              std::size_t{400} * 1024);
 
 /// Default answers.
 inline void clear(const Answers& answers, std::size_t begin, std::size_t count) noexcept {

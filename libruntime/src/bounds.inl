@@ -10,8 +10,8 @@ HWY_NOINLINE void prove(const Resident& resident, const PartRecord& part, const 
   const VI cells = all_int(part.bound_cells), byte = all_int(255);
   for (std::uint32_t i = range.begin; i < range.end; i += lane_count()) {
     const V3 p = load3(entries.x, entries.y, entries.z, i);
-    const V3 q{p.x * all(part.inverse_axes.x), p.y * all(part.inverse_axes.y),
-               p.z * all(part.inverse_axes.z)};
+    const V3 q{p.x * all(part.inverse_extents.x), p.y * all(part.inverse_extents.y),
+               p.z * all(part.inverse_extents.z)};
     const V x = hn::Abs(q.x), y = hn::Abs(q.y), z = hn::Abs(q.z);
     const M x_first = hn::Ge(x, y), by_x = hn::And(x_first, hn::Ge(x, z));
     const M by_y = hn::AndNot(x_first, hn::Ge(y, z));

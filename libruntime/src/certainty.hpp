@@ -11,8 +11,8 @@ namespace sqmap::runtime {
 inline Certainty told_by(const Resident& resident, const PartRecord& part, const Vec3f& p_part) noexcept {
   if (part.bound_cells == 0) return Certainty::kUnsure;
   const auto side_of = [](bool is_inside) { return is_inside ? Certainty::kInside : Certainty::kOutside; };
-  const Vec3f q{p_part.x * part.inverse_axes.x, p_part.y * part.inverse_axes.y,
-                p_part.z * part.inverse_axes.z};
+  const Vec3f q{p_part.x * part.inverse_extents.x, p_part.y * part.inverse_extents.y,
+                p_part.z * part.inverse_extents.z};
   const BoundPlace<float> at = bound_place(q, part.bound_cells);
   const BoundCell cell = resident.bound(part, at.cell);
   const float height = bound_height(cell, at);

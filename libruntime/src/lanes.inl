@@ -93,10 +93,16 @@ SQMAP_KERNEL V exp2_of(V x) {
 }
 HWY_INLINE V power_of(V x, float k) { return exp2_of(all(k) * log2_of(x)); }
 
+/// narrowing_at() of chart.hpp.
+HWY_INLINE V narrowing_of(const PartRecord& part, V z) {
+  return all(1.0F + std::abs(part.taper)) / (all(1.0F) + all(part.taper) * (z * all(part.inverse_extents.z)));
+}
 /// shape_normal() of chart.hpp.
 SQMAP_KERNEL V3 shape_normal_of(const PartRecord& part, const V3& p) {
   const V zero = hn::Zero(kD), one = all(1.0F);
-  const V bx = all(part.inverse_axes.x), by = all(part.inverse_axes.y), bz = all(part.inverse_axes.z);
+  const V narrowing = narrowing_of(part, p.z);
+  const V bx = all(part.inverse_extents.x) * narrowing, by = all(part.inverse_extents.y) * narrowing,
+          bz = all(part.inverse_extents.z);
   const V x = hn::Abs(p.x) * bx, y = hn::Abs(p.y) * by, z = hn::Abs(p.z) * bz;
   const V more = most(x, y);
   const M off_axis = hn::Gt(more, zero);
@@ -110,8 +116,9 @@ SQMAP_KERNEL V3 shape_normal_of(const PartRecord& part, const V3& p) {
   const M known = hn::Gt(scale, zero);
   const V whole = pick(known, scale, one);
   const V rim = power_of(u / whole, part.power_1 - 1);
+  const V lean = (all(part.taper) * (narrowing / all(1.0F + std::abs(part.taper)))) * (rim * u) * bz;
   const V3 n{hn::CopySign(rim * normal_x * bx, p.x), hn::CopySign(rim * normal_y * by, p.y),
-             hn::CopySign(power_of(z / whole, part.power_1 - 1) * bz, p.z)};
+             hn::CopySign(power_of(z / whole, part.power_1 - 1) * bz, p.z) - lean};
   return pick(known, normalized3(n), V3{zero, zero, zero});
 }
 
@@ -161,6 +168,15 @@ struct CurveCells {
 struct Tables {
   ShapeTable<float> shape;
   CurveCells eta, omega;
+  CurveCells eta_below;  ///< of a tapered part only
+
+  bool is_tapered() const noexcept { return shape.taper != 0; }
+  /// Once `shape` is there.
+  void set_cells() noexcept {
+    eta.set(shape.eta);
+    omega.set(shape.omega);
+    if (is_tapered()) eta_below.set(shape.eta_below);
+  }
 };
 
 /// The coefficients of c (first = 0) or s (4) of the lanes' cells.
@@ -221,6 +237,30 @@ SQMAP_KERNEL Place place_at(const CurveCells& curve, V position) {
   hermite(cubic, t, place.s, place.s_1, place.s_2);
   return place;
 }
+/// Of places `along` the meridian of a tapered part, the lanes `below` the equator.
+HWY_NOINLINE void turn_below(const Tables& tables, V along, M below, Place& place) {
+  const Place down = place_at(tables.eta_below, along);
+  place = {pick(below, down.c, place.c),     pick(below, down.s, place.s),
+           pick(below, down.c_1, place.c_1), pick(below, down.s_1, place.s_1),
+           pick(below, down.c_2, place.c_2), pick(below, down.s_2, place.s_2)};
+}
+/// ShapeTable::eta_at of a tapered part.
+HWY_NOINLINE void tapered_eta_at(const Tables& tables, V u, Place& place) {
+  const M below = hn::Lt(u, hn::Zero(kD));
+  place = place_at(tables.eta, hn::Abs(u));
+  turn_below(tables, hn::Abs(u), below, place);
+  const auto turned = [&](V value) HWY_ATTR { return pick(below, hn::Neg(value), value); };
+  place = {place.c, turned(place.s), turned(place.c_1), place.s_1, place.c_2, turned(place.s_2)};
+}
+HWY_INLINE Place eta_at(const Tables& tables, V u) {
+  Place place;
+  if (tables.is_tapered()) [[unlikely]] {
+    tapered_eta_at(tables, u, place);
+  } else {
+    place = place_at(tables.eta, u);
+  }
+  return place;
+}
 HWY_INLINE V3 gradient(const ShapeTable<float>& table, const Place& e, const Place& o) {
   const V w = o.c * o.s_1 - o.s * o.c_1;
   return {(e.s_1 * o.s_1) * all(table.inverse_axes.x), (e.s_1 * hn::Neg(o.c_1)) * all(table.inverse_axes.y),
@@ -234,7 +274,7 @@ struct VFoot {
 SQMAP_KERNEL void newton_step(const Tables& tables, const V3& m, V& u, V& v) {
   using Table = ShapeTable<float>;
   const Table& table = tables.shape;
-  const Place e = place_at(tables.eta, u), o = place_at(tables.omega, v);
+  const Place e = eta_at(tables, u), o = place_at(tables.omega, v);
   const V ax = all(table.axes_m.x), ay = all(table.axes_m.y), az = all(table.axes_m.z);
   const V x = ax * o.c, y = ay * o.s, x_1 = ax * o.c_1, y_1 = ay * o.s_1, x_2 = ax * o.c_2, y_2 = ay * o.s_2;
   const V z_1 = az * e.s_1, z_2 = az * e.s_2;
@@ -257,38 +297,49 @@ SQMAP_KERNEL void newton_step(const Tables& tables, const V3& m, V& u, V& v) {
   const V du = (coupling * g_v - h_vv * g_u) * inverse;
   const V dv = (coupling * g_u - h_uu * g_v) * inverse;
   const V step = all(Table::kMostStep), back = all(-Table::kMostStep), end = all(float{Table::kCells});
-  u = limited(u + limited(du, back, step), hn::Zero(kD), end);
+  const V lowest = all(tables.is_tapered() ? -float{Table::kCells} : 0.0F);
+  u = limited(u + limited(du, back, step), lowest, end);
   v = limited(v + limited(dv, back, step), hn::Zero(kD), end);
+}
+
+/// ShapeTable::choose_start.
+SQMAP_KERNEL void choose_start(const ShapeTable<float>::Scan& scan, const V3& m, V& u, V& v, V& greatest) {
+  using Table = ShapeTable<float>;
+  V along[Table::kScan];
+  for (int j = 0; j < Table::kScan; ++j) along[j] = all(scan.x_m[j]) * m.x + all(scan.y_m[j]) * m.y;
+  for (int i = 0; i < Table::kScan; ++i) {
+    V row_most = along[0] - all(scan.half_square_m2[i][0]);
+    V row_v = all(static_cast<float>(Table::scan_node(0)));
+    for (int j = 1; j < Table::kScan; ++j) {
+      const V here = along[j] - all(scan.half_square_m2[i][j]);
+      row_v = pick(hn::Gt(here, row_most), all(static_cast<float>(Table::scan_node(j))), row_v);
+      row_most = most(here, row_most);
+    }
+    const V here = all(scan.c[i]) * row_most + (all(scan.z_m[i]) * m.z - all(scan.half_z_square_m2[i]));
+    const M better = hn::Gt(here, greatest);
+    u = pick(better, all(static_cast<float>(Table::scan_node(i))), u);
+    v = pick(better, row_v, v);
+    greatest = most(here, greatest);
+  }
 }
 
 /// ShapeTable::foot.
 SQMAP_KERNEL VFoot foot_of(const Tables& tables, const V3& point) {
   using Table = ShapeTable<float>;
   const Table& table = tables.shape;
-  const V3 m{hn::Abs(point.x), hn::Abs(point.y), hn::Abs(point.z)};
-  V along[Table::kScan];
-  for (int j = 0; j < Table::kScan; ++j) {
-    along[j] = all(table.scan.x_m[j]) * m.x + all(table.scan.y_m[j]) * m.y;
-  }
+  const bool tapered = tables.is_tapered();
+  const V3 m{hn::Abs(point.x), hn::Abs(point.y), tapered ? point.z : hn::Abs(point.z)};
   V u = hn::Zero(kD), v = hn::Zero(kD), greatest = all(-std::numeric_limits<float>::infinity());
-  for (int i = 0; i < Table::kScan; ++i) {
-    V row_most = along[0] - all(table.scan.half_square_m2[i][0]);
-    V row_v = all(static_cast<float>(Table::scan_node(0)));
-    for (int j = 1; j < Table::kScan; ++j) {
-      const V here = along[j] - all(table.scan.half_square_m2[i][j]);
-      row_v = pick(hn::Gt(here, row_most), all(static_cast<float>(Table::scan_node(j))), row_v);
-      row_most = most(here, row_most);
-    }
-    const V here = all(table.scan.c[i]) * row_most +
-                   (all(table.scan.z_m[i]) * m.z - all(table.scan.half_z_square_m2[i]));
-    const M better = hn::Gt(here, greatest);
-    u = pick(better, all(static_cast<float>(Table::scan_node(i))), u);
-    v = pick(better, row_v, v);
-    greatest = most(here, greatest);
+  choose_start(table.scan, m, u, v, greatest);
+  if (tapered) [[unlikely]] {
+    const V above = greatest;
+    V u_below = u;
+    choose_start(table.scan_below, {m.x, m.y, hn::Neg(m.z)}, u_below, v, greatest);
+    u = pick(hn::Gt(greatest, above), hn::Neg(u_below), u);
   }
   for (int step = 0; step < Table::kNewtonSteps; ++step) newton_step(tables, m, u, v);
 
-  const Place e = place_at(tables.eta, u), o = place_at(tables.omega, v);
+  const Place e = eta_at(tables, u), o = place_at(tables.omega, v);
   const V ax = all(table.axes_m.x), ay = all(table.axes_m.y), az = all(table.axes_m.z);
   const V x = ax * o.c, y = ay * o.s;
   const V dx = x * e.c - m.x, dy = y * e.c - m.y, dz = az * e.s - m.z;
@@ -300,7 +351,7 @@ SQMAP_KERNEL VFoot foot_of(const Tables& tables, const V3& point) {
               (e.c * hn::Sqrt(x_1 * x_1 + y_1 * y_1)) * all(table.omega_per_col);
   const V du = u * all(table.row_per_eta), dv = v * all(table.col_per_omega);
   const V zero = hn::Zero(kD), half_rows = all(table.half_rows);
-  foot.row = pick(hn::Lt(point.z, zero), half_rows - du, half_rows + du);
+  foot.row = tapered ? half_rows + du : pick(hn::Lt(point.z, zero), half_rows - du, half_rows + du);
   const V turn = all(4.0F * table.quarter_cols), half_turn = all(2.0F * table.quarter_cols);
   const M left = hn::Lt(point.x, zero);
   const V before = pick(left, dv, half_turn - dv);
@@ -318,8 +369,12 @@ SQMAP_KERNEL Sample sample_at(const Tables& tables, V row, V col) {
   const ShapeTable<float>& table = tables.shape;
   const V zero = hn::Zero(kD), one = all(1.0F), minus = all(-1.0F);
   const V up = row - all(table.half_rows);
-  const V z_sign = pick(hn::Lt(up, zero), minus, one);
-  const Place e = place_at(tables.eta, hn::Abs(up) * all(table.eta_per_row));
+  const M below = hn::Lt(up, zero);
+  const V z_sign = pick(below, minus, one);
+  const V from_equator = hn::Abs(up) * all(table.eta_per_row);
+  Place e = place_at(tables.eta, from_equator);
+  if (tables.is_tapered()) [[unlikely]]
+    turn_below(tables, from_equator, below, e);
 
   const V turn = all(4.0F * table.quarter_cols), half_turn = all(2.0F * table.quarter_cols);
   const V raised = pick(hn::Lt(col, zero), col + turn, col);

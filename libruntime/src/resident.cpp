@@ -132,11 +132,19 @@ StoredCurve pack(const CurveTable<double>& curve) {
 /// The curves of a part, which cost more than all else that is laid out.
 struct Curves {
   explicit Curves(const Superquadric& shape)
-      : eta(pack(CurveTable<double>::of(std::sqrt(shape.semi_axes_m.x * shape.semi_axes_m.y),
-                                        shape.semi_axes_m.z, shape.e1))),
-        omega(pack(CurveTable<double>::of(shape.semi_axes_m.x, shape.semi_axes_m.y, shape.e2))) {}
-  StoredCurve eta, omega;
+      : eta(meridian(shape, shape.taper)),
+        omega(pack(CurveTable<double>::of(shape.semi_axes_m.x, shape.semi_axes_m.y, shape.e2))) {
+    if (shape.taper != 0) eta_below = meridian(shape, -shape.taper);
+  }
+  StoredCurve eta, omega, eta_below{};
+
+ private:
+  static StoredCurve meridian(const Superquadric& shape, double taper) {
+    return pack(CurveTable<double>::of(std::sqrt(shape.semi_axes_m.x * shape.semi_axes_m.y),
+                                       shape.semi_axes_m.z, shape.e1, taper));
+  }
 };
+static_assert(sizeof(StoredCurve) == Resident::kBelowBytes);
 
 void unpack_curve(const PackedCurve& curve, const CurveUnits& units, CurveTable<float>& out) noexcept {
   // Sums first, then loops that the compiler turns into vectors.
@@ -189,11 +197,13 @@ PartRecord put_part(Layout& out, const Part& part, const Curves& curves, const V
   const DistanceMap& map = part.map;
   PartRecord record;
   record.semi_axes = cast<float>(units_per_m * part.shape.semi_axes_m);
-  record.inverse_axes = {1 / record.semi_axes.x, 1 / record.semi_axes.y, 1 / record.semi_axes.z};
+  record.taper = static_cast<float>(part.shape.taper);
+  const Vec3f half_extents = cast<float>(units_per_m * half_extents_m(part.shape));
+  record.inverse_extents = {1 / half_extents.x, 1 / half_extents.y, 1 / half_extents.z};
   record.power_1 = static_cast<float>(2 / part.shape.e1);
   record.power_2 = static_cast<float>(2 / part.shape.e2);
   record.power_ratio = static_cast<float>(part.shape.e2 / part.shape.e1);
-  record.slabs = Slabs::of(record.inverse_axes, part.shape.e1, part.shape.e2);
+  record.slabs = Slabs::of(record.inverse_extents, part.shape.e1, part.shape.e2, part.shape.taper);
   record.object_from_part = rotation<float>(part.object_from_part.orientation);
   record.translation =
       cast<float>(units_per_m * (part.object_from_part.translation_m - cast<double>(origin_m)));
@@ -212,6 +222,7 @@ PartRecord put_part(Layout& out, const Part& part, const Curves& curves, const V
                                     [](std::uint8_t bits) { return bits != 0; });
   record.texel_bits = static_cast<std::uint8_t>(map.bits + (has_seam ? 1 : 0));
 
+  if (record.taper != 0) out.put(curves.eta_below);
   record.curves_at = out.at();
   out.put(curves.eta.packed);
   out.put(curves.omega.packed);
@@ -221,7 +232,7 @@ PartRecord put_part(Layout& out, const Part& part, const Curves& curves, const V
   record.bound_cells = static_cast<std::uint8_t>(part.bounds.cells);
   out.put(part.bounds.cell.data(), part.bounds.cell.size() * sizeof(BoundCell));
 
-  record.starts = StartTable::of(record.rows, record.cols, record.semi_axes);
+  record.starts = StartTable::of(record.rows, record.cols, half_extents);
   record.starts.at = out.at();
   const std::vector<std::uint8_t> no_starts(record.starts.bytes(), 0xFF);
   out.put(no_starts.data(), no_starts.size());
@@ -249,19 +260,29 @@ PartRecord put_part(Layout& out, const Part& part, const Curves& curves, const V
 
 }  // namespace
 
-Slabs Slabs::of(const Vec3f& inverse_axes, double e1, double e2) noexcept {
+Slabs Slabs::of(const Vec3f& inverse_extents, double e1, double e2, double taper) noexcept {
   constexpr double kSlack = 1 + 1e-4;
   // Dual to the norm with p = 2/e is that with q = 2/(2 - e): |(u, v)|_q, the larger of the two for e = 2.
   const auto dual = [](double u, double v, double e) {
     const double most = std::max(u, v), least = std::min(u, v), k = (2 - e) / 2;
     return k > 0 ? most * std::pow(1 + std::pow(least / most, 1 / k), k) : most;
   };
-  const double across = dual(1, 1, e2);
-  const auto b = cast<double>(inverse_axes);
+  double across = dual(1, 1, e2), up = dual(1, 1, e1), diagonal = dual(across, 1, e1);
+  if (taper != 0) {
+    const double widest = 1 + std::abs(taper);
+    const auto along = [&](double wide, double high) {
+      return largest_over_heights(taper, e1,
+                                  [=](double width, double w) { return wide * width / widest + high * w; });
+    };
+    up = along(1, 1);
+    diagonal = along(across, 1);
+    across = along(across, 0);
+  }
+  const auto b = cast<double>(inverse_extents);
   const auto reach = [](const Vec3d& direction) { return rounded_up(kSlack * norm(direction)); };
   return {rounded_up(kSlack * across),
-          rounded_up(kSlack * dual(1, 1, e1)),
-          rounded_up(kSlack * dual(across, 1, e1)),
+          rounded_up(kSlack * up),
+          rounded_up(kSlack * diagonal),
           reach({b.x, b.y, 0}),
           reach({b.x, 0, b.z}),
           reach({0, b.y, b.z}),
@@ -330,7 +351,12 @@ void Resident::unpack(const PartRecord& part, ShapeTable<float>& table) const no
   std::memcpy(curves, bytes_.get() + part.curves_at, sizeof curves);
   unpack_curve(curves[0], part.eta_units, table.eta);
   unpack_curve(curves[1], part.omega_units, table.omega);
-  table.prepare(part.semi_axes, part.rows, part.cols);
+  if (part.taper != 0) {
+    StoredCurve below;
+    std::memcpy(&below, bytes_.get() + part.curves_at - kBelowBytes, sizeof below);
+    unpack_curve(below.packed, below.units, table.eta_below);
+  }
+  table.prepare(part.semi_axes, part.taper, part.rows, part.cols);
 }
 
 }  // namespace sqmap::runtime

@@ -43,17 +43,19 @@ struct CurveUnits {
   float c{}, s{}, c_step{}, s_step{};
 };
 
-/// Planes that bound a superquadric besides its box. With w = |p| / semi_axes, for every p in it:
+/// Planes that bound a superquadric besides its box. With w = |p| / the box's half extents, for every p in
+/// it:
 ///
 ///     w_x + w_y <= across,    w_x + w_z <= up,    w_y + w_z <= up,    w_x + w_y + w_z <= diagonal
 ///
-/// These are the values of its support function in the directions 1/a, the dual norms of (1, 1) and (1, 1,
-/// 1); rounded up by far more than layer 1 errs.
+/// These are the values of its support function in these directions, of a rigid one the dual norms of (1, 1)
+/// and (1, 1, 1); rounded up by far more than layer 1 errs.
 struct Slabs {
   float across{}, up{}, diagonal{};
   /// How much a ball of radius 1 reaches beyond its centre in these sums: x + y, x + z, y + z, x + y + z.
   float across_reach{}, up_x_reach{}, up_y_reach{}, diagonal_reach{};
-  static Slabs of(const Vec3f& inverse_axes, double e1, double e2) noexcept;
+  /// inverse_extents: 1 / the box's half extents.
+  static Slabs of(const Vec3f& inverse_extents, double e1, double e2, double taper = 0) noexcept;
 };
 
 /// Where a search for the nearest point of the represented surface may begin, besides the foot. Tiles of the
@@ -70,7 +72,7 @@ struct StartTable {
   std::uint8_t step_shift{};  ///< log2 of the coarser grid's spacing [cells]
   float depths_per_unit{};
 
-  static StartTable of(std::uint32_t rows, std::uint32_t cols, const Vec3f& semi_axes) noexcept;
+  static StartTable of(std::uint32_t rows, std::uint32_t cols, const Vec3f& half_extents) noexcept;
   std::size_t bytes() const noexcept { return std::size_t{2} * kDepths * tile_rows * tile_cols; }
   /// Of a row or column of the coarser grid: that of the middle of its cell in the map.
   float place(std::uint32_t k) const noexcept {
@@ -81,8 +83,10 @@ struct StartTable {
 
 /// One part. Lengths in units of Resident::unit_m; byte offsets count from the start of the allocation.
 struct PartRecord {
-  Vec3f semi_axes, inverse_axes;
+  Vec3f semi_axes;
+  Vec3f inverse_extents;  ///< 1 / the half extents of its box; 1 / semi_axes of a rigid one
   float power_1{}, power_2{}, power_ratio{};  ///< 2/e1, 2/e2, e2/e1
+  float taper{};                              ///< K
   Slabs slabs;
   Rotation<float> object_from_part;
   Vec3f translation;
@@ -117,6 +121,8 @@ class Resident {
  public:
   static constexpr std::uint32_t kBlock = 8;         ///< texels a bit of a side list's blocks
   static constexpr std::uint32_t kCurveBytes = 520;  ///< of both curves of a part
+  static constexpr std::uint32_t kBelowBytes =
+      276;  ///< before them, of a tapered part: eta below the equator
 
   /// Precondition: a valid asset. fits() tells whether it could be held; if not, nothing is.
   explicit Resident(const Asset& asset);

@@ -43,7 +43,7 @@ std::uint32_t tiles_of(std::uint32_t cells, std::uint32_t shift) noexcept {
 
 }  // namespace
 
-StartTable StartTable::of(std::uint32_t rows, std::uint32_t cols, const Vec3f& semi_axes) noexcept {
+StartTable StartTable::of(std::uint32_t rows, std::uint32_t cols, const Vec3f& half_extents) noexcept {
   StartTable table;
   std::uint32_t tile = kLeastTileShift, step = 0;
   // A foot may lie on the last row of nodes.
@@ -55,8 +55,8 @@ StartTable StartTable::of(std::uint32_t rows, std::uint32_t cols, const Vec3f& s
   table.step_shift = static_cast<std::uint8_t>(step);
   table.tile_rows = tiles_of(rows, tile);
   table.tile_cols = tiles_of(cols, tile);
-  // No point of a superquadric lies deeper than its shortest semi-axis.
-  table.depths_per_unit = kDepths / lesser(lesser(semi_axes.x, semi_axes.y), semi_axes.z);
+  // No point of a superquadric lies deeper than the shortest half extent of its box.
+  table.depths_per_unit = kDepths / lesser(lesser(half_extents.x, half_extents.y), half_extents.z);
   return table;
 }
 

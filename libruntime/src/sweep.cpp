@@ -22,7 +22,7 @@ Result<Sweeper> Sweeper::build(const Asset& asset) {
   sweeper.bodies_.reserve(asset.parts.size());
   for (const Part& part : asset.parts) {
     const Vec3d& a_m = part.shape.semi_axes_m;
-    const double least_m = std::min({a_m.x, a_m.y, a_m.z});
+    const double least_m = (1 - std::abs(part.shape.taper)) * std::min({a_m.x, a_m.y, a_m.z});
     const double reach_m = norm(part.object_from_part.translation_m) + part.sphere.radius_m;
     // Four roundings of the coordinates, seen across the thinnest direction; 16 of beta itself.
     const double skin = std::numeric_limits<float>::epsilon() * std::max(4 * reach_m / least_m, 16.0);

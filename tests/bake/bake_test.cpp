@@ -164,6 +164,32 @@ TEST(Bake, StopsWhenAsked) {
   EXPECT_EQ(result.error().status, Status::kCancelled);
 }
 
+TEST(Bake, TapersWhereThatSavesMemoryAndNowhereElse) {
+  BakeOptions rigid = quick_options(), tapered = quick_options();
+  tapered.fit.taper = true;
+  for (const int index : {0, 1, 2, 4}) {
+    const NamedShape shape = analytic_shapes()[index];
+    SCOPED_TRACE(shape.name);
+    const auto a = bake(test::as_source(shape.mesh), rigid), b = bake(test::as_source(shape.mesh), tapered);
+    ASSERT_TRUE(a.ok() && b.ok());
+    EXPECT_TRUE(validate(b.value().asset, CheckLevel::kFull).empty());
+    int tapers = 0;
+    for (const Part& part : b.value().asset.parts) tapers += part.shape.taper != 0;
+    for (const Part& part : a.value().asset.parts) EXPECT_EQ(part.shape.taper, 0);
+    const auto bytes = [](const Asset& asset) {
+      return runtime::Object::build(asset).value().resident_bytes();
+    };
+    const bool is_cone = index == 4;
+    EXPECT_EQ(tapers > 0, is_cone);
+    if (is_cone) {
+      EXPECT_LT(bytes(b.value().asset), 0.9 * bytes(a.value().asset));
+    } else {
+      EXPECT_EQ(b.value().asset.parts, a.value().asset.parts);
+    }
+    EXPECT_LE(finest(b.value().asset, 3).eq35_percent, 0.1);
+  }
+}
+
 TEST(Bake, UndoesSplitsThatDoNotLowerTheError) {
   BakeOptions options = quick_options();
   options.max_error_percent = 0.008;  // more than drafts of a cone's maps reach, however it is cut
@@ -198,6 +224,7 @@ TEST(Bake, WritesDownEveryOptionThatDecidesTheBytes) {
   EXPECT_TRUE(changes([](BakeOptions& o) { o.decompose.locale_width = 0.02; }));
   EXPECT_TRUE(changes([](BakeOptions& o) { o.decompose.join_components = true; }));
   EXPECT_TRUE(changes([](BakeOptions& o) { o.fit.quick = true; }));
+  EXPECT_TRUE(changes([](BakeOptions& o) { o.fit.taper = true; }));
   EXPECT_TRUE(changes([](BakeOptions& o) { o.read.up = UpAxis::kY; }));
   EXPECT_TRUE(changes([](BakeOptions& o) { o.repair.max_hole_edges = 7; }));
   EXPECT_TRUE(changes([](BakeOptions& o) { o.seed = 2; }));

@@ -79,7 +79,7 @@ FitOptions all_exponents() {
 
 void expect_bounded(const Fit& fit, const Points& points) {
   const SuperquadricOf<float> in_float{cast<float>(fit.shape.semi_axes_m), static_cast<float>(fit.shape.e1),
-                                       static_cast<float>(fit.shape.e2)};
+                                       static_cast<float>(fit.shape.e2), static_cast<float>(fit.shape.taper)};
   for (const Vec3d& p : points) {
     const Vec3d q = to_part(fit, p);
     ASSERT_LE(inside_outside_radial(fit.shape, q), 1.0);
@@ -130,6 +130,66 @@ TEST(FitSuperquadric, RecoversTheSuperquadricThatThePointsLieOn) {
       deviation = std::max(deviation,
                            std::abs(inside_outside_radial(fit.value().shape, to_part(fit.value(), p)) - 1));
     EXPECT_LT(deviation, 0.005) << "shape " << i;
+  }
+}
+
+// As above, of tapered ones; the points alone must find the axis of the taper.
+TEST(FitSuperquadric, RecoversTheTaperedSuperquadricThatThePointsLieOn) {
+  constexpr int kShapes = 40, kChecks = 2000;
+  std::mt19937_64 rng(31);
+  int found = 0;
+  for (int i = 0; i < kShapes; ++i) {
+    Superquadric truth = random_superquadric(rng);
+    truth.taper = uniform(rng, -0.85, 0.85) * max_taper(truth.e1);
+    const Pose pose = random_pose(rng);
+    const Points points = moved(sampled(truth, 500 + 8 * i, rng), pose);
+    FitOptions options = all_exponents();
+    options.taper = true;
+    const auto fit = fit_superquadric(points, options);
+    ASSERT_TRUE(fit.ok());
+    expect_bounded(fit.value(), points);
+    double deviation = 0;
+    for (const Vec3d& p : moved(sampled(truth, kChecks, rng), pose))
+      deviation = std::max(deviation,
+                           std::abs(inside_outside_radial(fit.value().shape, to_part(fit.value(), p)) - 1));
+    found += deviation < 0.005;
+  }
+  RecordProperty("found", found);
+  EXPECT_GE(found, 36);
+}
+
+TEST(FitSuperquadric, TapersACloudThatNarrowsAndIsSoundForAnyCloud) {
+  std::mt19937_64 rng(32);
+  FitOptions options;
+  options.taper = true;
+  Points frustum;
+  for (const double z : {-1.0, 0.0, 1.0})
+    for (int k = 0; k < 64; ++k) {
+      const double turn = 2 * std::numbers::pi * k / 64, radius = 0.6 - 0.4 * z;
+      frustum.push_back({radius * std::cos(turn), radius * std::sin(turn), 2 * z});
+    }
+  const Points turned = moved(frustum, random_pose(rng));
+  const Fit tapered = fit_superquadric(turned, options).value(), rigid = fit_superquadric(turned).value();
+  expect_bounded(tapered, turned);
+  EXPECT_GT(std::abs(tapered.shape.taper), 0.3);
+  EXPECT_LT(tapered.volume_m3, 0.75 * rigid.volume_m3);
+  EXPECT_EQ(rigid.shape.taper, 0);
+  for (int i = 0; i < 20; ++i) {
+    options.quick = i % 2 == 0;
+    const Points points = moved(blob(4 + 30 * i, rng), random_pose(rng));
+    const Fit fit = fit_superquadric(points, options).value();
+    expect_sound(fit, options);
+    expect_bounded(fit, points);
+    EXPECT_LE(std::abs(fit.shape.taper), max_taper(fit.shape.e1));
+  }
+  // Needles, plates, a single triangle, four points, one point.
+  for (const Points& points :
+       {Points{{0, 0, 0}, {0, 0, 1}, {0, 0, 2}}, Points{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 1, 0}},
+        Points{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, Points{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}},
+        Points{{1, 2, 3}}}) {
+    const Fit fit = fit_superquadric(points, options).value();
+    expect_bounded(fit, points);
+    EXPECT_LE(std::abs(fit.shape.taper), max_taper(fit.shape.e1));
   }
 }
 
@@ -430,6 +490,24 @@ TEST(Volume, EqualsItsMonteCarloEstimate) {
                  share = inside / double{kDraws};
     const double sigma = std::sqrt(share * (1 - share) / kDraws);
     EXPECT_NEAR(volume_m3(sq), 8 * octant * share, 4 * 8 * octant * sigma);
+  }
+}
+
+TEST(Volume, OfATaperedShapeEqualsItsMonteCarloEstimate) {
+  std::mt19937_64 rng(23);
+  constexpr int kDraws = 100000;
+  for (int i = 0; i < 8; ++i) {
+    Superquadric sq = random_superquadric(rng);
+    sq.taper = (i % 2 == 0 ? 0.9 : -0.9) * max_taper(sq.e1);
+    const Vec3d half_m = half_extents_m(sq);
+    int inside = 0;
+    for (int k = 0; k < kDraws; ++k)
+      inside += inside_outside_radial(sq, {uniform(rng, 0, half_m.x), uniform(rng, 0, half_m.y),
+                                           uniform(rng, -half_m.z, half_m.z)}) < 1;
+    const double quarter = half_m.x * half_m.y * 2 * half_m.z, share = inside / double{kDraws};
+    const double sigma = std::sqrt(share * (1 - share) / kDraws);
+    EXPECT_NEAR(volume_m3(sq), 4 * quarter * share, 4 * 4 * quarter * sigma);
+    EXPECT_GT(volume_m3(sq) / volume_m3({sq.semi_axes_m, sq.e1, sq.e2}), 1);
   }
 }
 

@@ -131,14 +131,21 @@ TEST(MeshQueries, LinesTellTheSameInsideAsWindingNumbers) {
 
 constexpr std::uint64_t kNoLimit = std::uint64_t{1} << 40;
 
+/// Each part's own superquadric and no other.
+std::vector<std::vector<PlacedShape>> own_shapes(const std::vector<Part>& parts) {
+  std::vector<std::vector<PlacedShape>> shapes;
+  for (const Part& part : parts) shapes.push_back({{part.shape, part.object_from_part}});
+  return shapes;
+}
+
 TEST(MapParts, SpendTexelsOnlyWhereTheTargetAsksForThem) {
   const Scene scene(test::box({0.4, 0.5, 0.6}));
   std::vector<Part> parts{part_around({{0.9, 1.0, 1.1}, 0.7, 0.7})};
   const MeshQueries queries = scene.queries();
-  MapDrawer drawer(parts, {1.0}, queries);
-  EXPECT_FALSE(drawer.draw(parts, {1e-2, kNoLimit}));
+  MapDrawer drawer(own_shapes(parts), {1.0}, queries);
+  EXPECT_FALSE(drawer.draw(parts, {1e-2, kNoLimit}, 1));
   const auto coarse = parts[0].map.code.size();
-  EXPECT_FALSE(drawer.draw(parts, {1e-3, kNoLimit}));
+  EXPECT_FALSE(drawer.draw(parts, {1e-3, kNoLimit}, 1));
   EXPECT_GT(parts[0].map.code.size(), 2 * coarse);
   EXPECT_GE(parts[0].map.bits, 8U);
 }
@@ -148,7 +155,7 @@ TEST(MapParts, GiveTexelsToThePartWithTheLargerShareOfTheSurface) {
   const Part part = part_around({{0.9, 1.0, 1.1}, 0.7, 0.7});
   std::vector<Part> parts{part, part};
   const MeshQueries queries = scene.queries();
-  MapDrawer(parts, {1.0, 20.0}, queries).draw(parts, {2e-3, kNoLimit});
+  MapDrawer(own_shapes(parts), {1.0, 20.0}, queries).draw(parts, {2e-3, kNoLimit}, 1);
   EXPECT_GT(parts[1].map.code.size(), 2 * parts[0].map.code.size());
 }
 
@@ -156,7 +163,7 @@ TEST(MapParts, KeepToTheByteBudgetAndSaySo) {
   const Scene scene(test::box({0.4, 0.5, 0.6}));
   std::vector<Part> parts{part_around({{0.9, 1.0, 1.1}, 0.7, 0.7})};
   const MeshQueries queries = scene.queries();
-  EXPECT_TRUE(MapDrawer(parts, {1.0}, queries).draw(parts, {1e-4, 2000}));
+  EXPECT_TRUE(MapDrawer(own_shapes(parts), {1.0}, queries).draw(parts, {1e-4, 2000}, 1));
   EXPECT_LE(parts[0].map.code.size() * parts[0].map.bits / 8, 3000U);
 }
 

@@ -63,6 +63,7 @@ struct Shape {
   std::vector<Place> places;
   Closeness layer_2{}, layer_3{};
   Shares shares_2{}, shares_3{};
+  bool taper = false;  ///< FitOptions::taper
 };
 
 double box_depth_m(const Vec3d& p, const Vec3d& half_m, const Vec3d& centre_m = {}) {
@@ -168,6 +169,14 @@ std::vector<Shape> make_shapes() {
        .layer_3 = {0.0015, 5 * kDegree},
        .shares_2 = {0.06, 0.3, 0.06},
        .shares_3 = {0.004, 0.01, 0.012}});
+  Shape tapered = shapes.back();
+  tapered.name = "cone_by_tapers";
+  tapered.taper = true;
+  tapered.most_union = 1.2;
+  tapered.layer_2 = tapered.layer_3;
+  tapered.layer_2.may_be_unknown = true;
+  tapered.shares_2 = {0.06, 0.08, 0.06};
+  shapes.push_back(tapered);
   shapes.push_back(
       {.name = "l_shape",
        .mesh = test::l_shape(2, 0.5),
@@ -312,14 +321,17 @@ const std::vector<Shape>& all_shapes() {
   return shapes;
 }
 
-/// Barr's function, as he wrote it.
+/// Barr's function, as he wrote it, of the point with its taper undone.
 bool holds(const Part& part, const Vec3d& p_m) {
   const Vec3d local_m =
       rotation(part.object_from_part.orientation).apply_inverse(p_m - part.object_from_part.translation_m);
   const Vec3d& semi_axes_m = part.shape.semi_axes_m;
   const double e1 = part.shape.e1, e2 = part.shape.e2;
-  const double x = std::abs(local_m.x / semi_axes_m.x), y = std::abs(local_m.y / semi_axes_m.y);
+  const double width = 1 + part.shape.taper * local_m.z / semi_axes_m.z;
+  const double x = std::abs(local_m.x / semi_axes_m.x) / width;
+  const double y = std::abs(local_m.y / semi_axes_m.y) / width;
   const double z = std::abs(local_m.z / semi_axes_m.z);
+  if (z > 1) return false;
   return std::pow(std::pow(x, 2 / e2) + std::pow(y, 2 / e2), e2 / e1) + std::pow(z, 2 / e1) <= 1;
 }
 
@@ -410,6 +422,7 @@ TEST_P(SimpleShape, StaysExact) {
   const Shape& shape = all_shapes()[static_cast<std::size_t>(GetParam())];
   BakeOptions options;
   options.sample_count = 2000;
+  options.fit.taper = shape.taper;
   const auto baked = bake(test::as_source(shape.mesh), options);
   ASSERT_TRUE(baked.ok()) << baked.error().finding;
   const Asset& asset = baked.value().asset;

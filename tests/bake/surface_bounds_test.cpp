@@ -98,6 +98,8 @@ std::vector<AdverseShape> adverse_shapes() {
       {"comb of needles", comb(6, 0.01), {{1.4, 1.4, 1}, 0.2, 0.2}, 0.4},
       {"torus", test::torus(0.7, 0.2, 64, 32), {{1, 1, 0.3}, 0.6, 1}, 0.7},
       {"ball beyond the superquadric", test::sphere(1, 5), {{0.7, 1.2, 0.9}, 0.4, 1.7}, 0.6},
+      {"ball beyond the tapered superquadric", test::sphere(1, 5), {{0.7, 1.0, 0.9}, 0.4, 1.2, -0.6}, 0.6},
+      {"spike in a tapered superquadric", spiked_ball(0.5, 0.75, tip_m), {{0.9, 0.9, 1}, 0.5, 1, 0.3}, 0.8},
   };
 }
 

@@ -24,6 +24,7 @@ using test::bounded_asset;
 using test::Bytes;
 using test::identical;
 using test::rich_asset;
+using test::tapered_asset;
 
 Bytes encoded(const Asset& asset) {
   auto bytes = io::encode(asset);
@@ -49,23 +50,27 @@ TEST(Bundle, RoundTripKeepsAnAssetThatHasOnlyWhatItMust) {
   EXPECT_TRUE(identical(decoded.value(), asset));
 }
 
-TEST(Bundle, RoundTripKeepsBounds) {
-  const auto decoded = io::decode(encoded(bounded_asset()));
-  ASSERT_TRUE(decoded) << decoded.error().finding;
-  EXPECT_TRUE(identical(decoded.value(), bounded_asset()));
-  EXPECT_FALSE(identical(decoded.value(), rich_asset()));
+TEST(Bundle, RoundTripKeepsBoundsAndTapers) {
+  for (const Asset& asset : {bounded_asset(), tapered_asset()}) {
+    const auto decoded = io::decode(encoded(asset));
+    ASSERT_TRUE(decoded) << decoded.error().finding;
+    EXPECT_TRUE(identical(decoded.value(), asset));
+    EXPECT_FALSE(identical(decoded.value(), rich_asset()));
+  }
+  EXPECT_FALSE(identical(tapered_asset(), bounded_asset()));
 }
 
-// What has no bounds is a bundle of version 1.0, for readers that know no other.
+// What has no bounds and no tapers is a bundle of version 1.0, for readers that know no other.
 TEST(Bundle, HasTheEarliestVersionThatHoldsIt) {
-  for (const std::uint32_t minor : {0U, 1U}) {
-    const Bytes bytes = encoded(minor == 0 ? rich_asset() : bounded_asset());
+  for (const std::uint32_t minor : {0U, 1U, 2U}) {
+    const Bytes bytes = encoded(minor == 0 ? rich_asset() : minor == 1 ? bounded_asset() : tapered_asset());
     std::uint32_t found = 9;
     std::memcpy(&found, bytes.data() + 12, 4);
     EXPECT_EQ(found, minor);
     const auto sizes = io::stored_bytes(bytes);
     ASSERT_TRUE(sizes);
-    EXPECT_EQ(sizes.value().back().name, minor == 0 ? "/errors" : "/maps/bounds");
+    constexpr const char* kLast[] = {"/errors", "/maps/bounds", "/parts/taper"};
+    EXPECT_EQ(sizes.value().back().name, kLast[minor]);
   }
 }
 
@@ -217,6 +222,15 @@ TEST(Bundle, GoldenBundleOfVersion1_1Loads) {
   const auto decoded = io::decode(bytes);
   ASSERT_TRUE(decoded) << decoded.error().finding;
   EXPECT_TRUE(identical(decoded.value(), bounded_asset()));
+}
+
+// Written when version 1.2 was made; never changes.
+TEST(Bundle, GoldenBundleOfVersion1_2Loads) {
+  std::ifstream file(SQMAP_GOLDEN_DIR "/v1_2.h5", std::ios::binary);
+  const Bytes bytes{std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+  const auto decoded = io::decode(bytes);
+  ASSERT_TRUE(decoded) << decoded.error().finding;
+  EXPECT_TRUE(identical(decoded.value(), tapered_asset()));
 }
 
 // Two rows by four columns, worked by hand from FORMAT.md section 6.1.

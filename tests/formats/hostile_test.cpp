@@ -179,6 +179,21 @@ TEST(Hostile, BoundsThatDoNotAddUpAreRefused) {
   }
 }
 
+TEST(Hostile, TapersThatDoNotAddUpAreRefused) {
+  const io::Document valid = io::to_document(test::tapered_asset());
+  ASSERT_TRUE(io::to_asset(valid));
+  for (const std::size_t bytes : {8U, 16U, 32U}) {
+    io::Document document = valid;
+    document.tables[io::kTaper].resize(bytes);
+    const auto asset = io::to_asset(document);
+    ASSERT_FALSE(asset);
+    EXPECT_NE(asset.error().finding.find("/parts/taper\""), std::string::npos) << asset.error().finding;
+  }
+  io::Document rigid = valid;
+  rigid.tables[io::kTaper].clear();
+  EXPECT_EQ(io::to_asset(rigid).value().parts[2].shape.taper, 0);
+}
+
 /// Length and digests as they would be had the file been made like this.
 Bytes resealed(Bytes bytes) {
   const std::uint64_t length = bytes.size();

@@ -41,6 +41,97 @@ TEST(InsideOutside, AgreesWithThePaperInLongDouble) {
   EXPECT_LT(inside, count * 9 / 10);
 }
 
+const double kTaperShares[] = {-1, -0.5, 0.7, 1};  // of max_taper
+
+Superquadric tapered(const Vec3d& axes, double e1, double e2, double share) {
+  return {axes, e1, e2, share * max_taper(e1)};
+}
+Superquadric rigid(Superquadric sq) {
+  sq.taper = 0;
+  return sq;
+}
+/// The paper's eq. (2) with K_x = K_y, in long double, and its inverse.
+long double taper_width(const Superquadric& sq, double z) {
+  return 1 + static_cast<long double>(sq.taper) / sq.semi_axes_m.z * z;
+}
+Vec3d untapered(const Superquadric& sq, const Vec3d& p) {
+  const long double width = taper_width(sq, p.z);
+  return {static_cast<double>(p.x / width), static_cast<double>(p.y / width), p.z};
+}
+
+TEST(Taper, SurfaceIsTheRigidOneTaperedAndHasBetaOne) {
+  for (const double e1 : kExponents) {
+    for (const double e2 : kExponents) {
+      for (const double share : kTaperShares) {
+        const Superquadric sq = tapered({1, 0.4, 2}, e1, e2, share);
+        for (int row = -16; row <= 16; ++row) {
+          for (int col = 0; col < 64; ++col) {
+            const auto eta = superellipse_point(std::cos(row * kPi / 32), std::sin(row * kPi / 32), e1);
+            const auto omega = superellipse_point(std::cos(col * kPi / 32), std::sin(col * kPi / 32), e2);
+            const Vec3d p = surface_point(sq, eta, omega);
+            const Vec3d bare = surface_point(rigid(sq), eta, omega);
+            EXPECT_NEAR(norm(untapered(sq, p) - bare), 0, 1e-13);
+            EXPECT_NEAR(inside_outside_radial(sq, p), 1, 1e-13);
+            EXPECT_NEAR(inside_outside_radial(sq, 1e-3 * p), 1e-3, 1e-15);
+            EXPECT_NEAR(inside_outside_radial(sq, 1e3 * p), 1e3, 1e-9);
+          }
+        }
+      }
+    }
+  }
+}
+
+TEST(Taper, InsideIsWhereThePaperSaysSoOfTheUntaperedPoint) {
+  std::mt19937_64 rng(11);
+  std::uniform_real_distribution<double> unit(-1, 1);
+  int inside = 0, count = 0;
+  for (const double e1 : kExponents) {
+    for (const double share : kTaperShares) {
+      const Superquadric sq = tapered({1, 0.4, 2}, e1, 0.7, share);
+      const SuperquadricOf<float> narrow{
+          {1, 0.4F, 2}, static_cast<float>(e1), 0.7F, static_cast<float>(sq.taper)};
+      for (int i = 0; i < 500; ++i) {
+        const Vec3d p{2 * unit(rng), 0.8 * unit(rng), 2 * unit(rng)};
+        const auto f = static_cast<double>(paper_f(sq, untapered(sq, p)));
+        if (std::abs(f - 1) < 1e-5) continue;
+        ++count;
+        inside += f < 1;
+        EXPECT_EQ(inside_outside_radial(sq, p) < 1, f < 1);
+        EXPECT_EQ(inside_outside_radial(narrow, cast<float>(p)) < 1, f < 1);
+        EXPECT_EQ(norm(normal_at(sq, p)) > 0.999, true);
+      }
+      EXPECT_EQ(inside_outside_radial(sq, {}), 0);
+      EXPECT_EQ(inside_outside_radial(sq, {0, 0, -4}), 2);
+      EXPECT_TRUE(std::isfinite(inside_outside_radial(sq, {1e-300, 0, 1e-300})));
+      EXPECT_TRUE(std::isnan(inside_outside_radial(sq, {std::nan(""), 0, 1})));
+    }
+  }
+  EXPECT_GT(inside, count / 20);
+  EXPECT_LT(inside, count * 9 / 10);
+}
+
+// By halves of chords on a fine grid: no formula of a derivative.
+TEST(MaxTaper, IsWhereTheProfileCeasesToBeConcave) {
+  constexpr int kSteps = 4000;
+  for (const double e1 : {0.1, 0.2, 0.5, 1.0, 1.5, 1.9}) {
+    const auto dent = [&](double taper) {
+      const auto width = [&](int k) {
+        const double w = static_cast<double>(k) / kSteps;
+        return std::pow(std::max(0.0, 1 - std::pow(std::abs(w), 2 / e1)), e1 / 2) * (1 + taper * w);
+      };
+      double most = 0;
+      for (int k = 1 - kSteps; k < kSteps; ++k)
+        most = std::max(most, (width(k - 1) + width(k + 1)) / 2 - width(k));
+      return most;
+    };
+    constexpr double kRounding = 1e-15;
+    EXPECT_LT(dent(max_taper(e1)), kRounding) << e1;
+    EXPECT_LT(dent(-max_taper(e1)), kRounding) << e1;
+    EXPECT_GT(dent(1.01 * max_taper(e1)), kRounding) << e1;
+  }
+  EXPECT_EQ(max_taper(2), 0);
+}
+
 TEST(InsideOutside, StaysAccurateInFloatAtEveryScaleAndExponent) {
   std::mt19937_64 rng(2);
   std::uniform_real_distribution<double> unit(0, 1);
@@ -104,17 +195,19 @@ TEST(SurfaceNormal, SupportsTheBody) {
   std::uniform_real_distribution<double> turn(-kPi, kPi);
   for (const double e1 : kExponents) {
     for (const double e2 : kExponents) {
-      const Superquadric sq{{1, 0.4, 2}, e1, e2};
-      const auto point = [&] {
-        const double eta = turn(rng) / 2, omega = turn(rng);
-        return std::pair{superellipse_point<double>(std::cos(eta), std::sin(eta), e1),
-                         superellipse_point<double>(std::cos(omega), std::sin(omega), e2)};
-      };
-      for (int i = 0; i < 200; ++i) {
-        const auto [u, v] = point();
-        const auto [a, b] = point();
-        const Vec3d n = surface_normal(sq, u, v);
-        EXPECT_LE(dot(n, surface_point(sq, a, b) - surface_point(sq, u, v)), 1e-12);
+      for (const double share : {0.0, -1.0, 0.6}) {
+        const Superquadric sq = tapered({1, 0.4, 2}, e1, e2, share);
+        const auto point = [&] {
+          const double eta = turn(rng) / 2, omega = turn(rng);
+          return std::pair{superellipse_point<double>(std::cos(eta), std::sin(eta), e1),
+                           superellipse_point<double>(std::cos(omega), std::sin(omega), e2)};
+        };
+        for (int i = 0; i < 200; ++i) {
+          const auto [u, v] = point();
+          const auto [a, b] = point();
+          const Vec3d n = surface_normal(sq, u, v);
+          EXPECT_LE(dot(n, surface_point(sq, a, b) - surface_point(sq, u, v)), 1e-12);
+        }
       }
     }
   }
@@ -125,8 +218,8 @@ TEST(NormalAt, IsTheGradientOfTheInsideOutsideFunction) {
   std::uniform_real_distribution<double> unit(-1, 1);
   for (const double e1 : {0.3, 1.0, 1.9}) {
     for (const double e2 : {0.3, 1.0, 1.9}) {
-      const Superquadric sq{{1, 0.4, 2}, e1, e2};
-      for (int i = 0; i < 50; ++i) {
+      for (int i = 0; i < 150; ++i) {
+        const Superquadric sq = tapered({1, 0.4, 2}, e1, e2, 0.9 * (i % 3 - 1));
         const Vec3d p{unit(rng), unit(rng), unit(rng)};
         constexpr double kStep = 1e-6;
         Vec3d gradient;
@@ -145,19 +238,23 @@ TEST(BoundingRadius, IsTheFarthestSurfacePoint) {
   for (const double e1 : kExponents) {
     for (const double e2 : kExponents) {
       for (const Vec3d axes : {Vec3d{1, 1, 1}, Vec3d{1, 0.3, 2}, Vec3d{5, 0.1, 0.4}}) {
-        const Superquadric sq{axes, e1, e2};
-        double farthest = 0;
-        for (int i = 0; i <= 400; ++i) {
-          for (int k = 0; k <= 400; ++k) {
-            const double eta = i * kPi / 800, omega = k * kPi / 800;
-            farthest = std::max(
-                farthest,
-                norm(surface_point(sq, superellipse_point<double>(std::cos(eta), std::sin(eta), e1),
-                                   superellipse_point<double>(std::cos(omega), std::sin(omega), e2))));
+        for (const double share : {0.0, 1.0, -0.6}) {
+          const Superquadric sq = tapered(axes, e1, e2, share);
+          const Vec3d half_m = half_extents_m(sq);
+          double farthest = 0, widest = 0;
+          for (int i = share == 0 ? 0 : -300; i <= 300; ++i) {
+            for (int k = 0; k <= 300; ++k) {
+              const double eta = i * kPi / 600, omega = k * kPi / 600;
+              const Vec3d p = surface_point(sq, superellipse_point<double>(std::cos(eta), std::sin(eta), e1),
+                                            superellipse_point<double>(std::cos(omega), std::sin(omega), e2));
+              farthest = std::max(farthest, norm(p));
+              widest = std::max({widest, p.x / half_m.x, p.y / half_m.y, std::abs(p.z) / half_m.z});
+            }
           }
+          EXPECT_GE(bounding_radius_m(sq), farthest * (1 - 1e-14));
+          EXPECT_LE(bounding_radius_m(sq), farthest * (share == 0 ? 1 + 1e-3 : 1 + 5e-3));
+          EXPECT_LE(widest, 1 + 1e-14);
         }
-        EXPECT_GE(bounding_radius_m(sq), farthest * (1 - 1e-14));
-        EXPECT_LE(bounding_radius_m(sq), farthest * (1 + 1e-3));
       }
     }
   }

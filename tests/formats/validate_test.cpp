@@ -16,7 +16,7 @@
 namespace sqmap {
 namespace {
 
-using test::bounded_asset;
+using test::tapered_asset;
 
 const double kNan = std::numeric_limits<double>::quiet_NaN();
 const double kInfinity = std::numeric_limits<double>::infinity();
@@ -77,6 +77,12 @@ const std::vector<Breakage>& breakages() {
       {28, "asset sphere of no size", [](Asset& a) { a.sphere.radius_m = 1e-305; }},
       {28, "semi-axis longer than the asset", [](Asset& a) { a.parts[1].shape.semi_axes_m.z = 3.1; }},
       {28, "part outside of the asset", [](Asset& a) { a.parts[2].object_from_part.translation_m.x = -2.9; }},
+      {29, "taper too large", [](Asset& a) { a.parts[0].shape.taper = -1.0001 * max_taper(0.8); }},
+      {29, "taper of an octahedron",
+       [](Asset& a) {
+         a.parts[0].shape = {{0.3, 0.4, 0.6}, 2, 1, 0.01};
+       }},
+      {29, "taper NaN", [](Asset& a) { a.parts[1].shape.taper = kNan; }},
       {30, "no level", [](Asset& a) { a.parts[1].map.level_count = 0; }},
       {30, "too many levels", [](Asset& a) { a.parts[1].map.level_count = 40; }},
       {31, "even rows", [](Asset& a) { a.parts[1].map.rows = 8; }},
@@ -133,13 +139,13 @@ std::set<int> rules_of(const std::vector<Finding>& findings) {
 }
 
 TEST(Validate, RichAssetBreaksNoRule) {
-  const auto findings = validate(bounded_asset(), CheckLevel::kFull);
+  const auto findings = validate(tapered_asset(), CheckLevel::kFull);
   EXPECT_TRUE(findings.empty()) << findings.front().rule << ": " << findings.front().message;
 }
 
 TEST(Validate, FindsEachBrokenRuleUnderItsNumber) {
   for (const Breakage& breakage : breakages()) {
-    Asset asset = bounded_asset();
+    Asset asset = tapered_asset();
     breakage.apply(asset);
     EXPECT_TRUE(rules_of(validate(asset, CheckLevel::kFull)).contains(breakage.rule))
         << breakage.what << " is not found as rule " << breakage.rule;
@@ -162,7 +168,7 @@ TEST(Validate, FormatPageListsExactlyTheseRules) {
 
 TEST(Validate, QuickFindsWhatAReaderMustTrust) {
   for (const Breakage& breakage : breakages()) {
-    Asset asset = bounded_asset();
+    Asset asset = tapered_asset();
     breakage.apply(asset);
     EXPECT_EQ(rules_of(validate(asset, CheckLevel::kQuick)).contains(breakage.rule), breakage.rule < 50)
         << breakage.what;
@@ -170,7 +176,7 @@ TEST(Validate, QuickFindsWhatAReaderMustTrust) {
 }
 
 TEST(Validate, NamesThePartAndTheValue) {
-  Asset asset = bounded_asset();
+  Asset asset = tapered_asset();
   asset.parts[1].shape.e1 = 7.25;
   const auto findings = validate(asset, CheckLevel::kQuick);
   ASSERT_EQ(findings.size(), 1u);
@@ -179,7 +185,7 @@ TEST(Validate, NamesThePartAndTheValue) {
 }
 
 TEST(Validate, OrdersFindingsByRuleAndPart) {
-  Asset asset = bounded_asset();
+  Asset asset = tapered_asset();
   asset.parts[2].shape.e1 = asset.parts[0].shape.e1 = 3;
   asset.parts[1].shape.semi_axes_m.x = -1;
   asset.r_max_m = -1;
@@ -192,11 +198,11 @@ TEST(Validate, OrdersFindingsByRuleAndPart) {
 }
 
 TEST(Validate, IsTotalForAnythingBrokenTogether) {
-  Asset asset = bounded_asset();
+  Asset asset = tapered_asset();
   std::set<int> rules;
   for (const Breakage& breakage : breakages()) {
     breakage.apply(asset);
-    if (asset.parts.size() != 3) asset.parts = bounded_asset().parts;
+    if (asset.parts.size() != 3) asset.parts = tapered_asset().parts;
     for (const Finding& finding : validate(asset, CheckLevel::kFull)) rules.insert(finding.rule);
   }
   EXPECT_GT(rules.size(), 20u);
@@ -204,7 +210,7 @@ TEST(Validate, IsTotalForAnythingBrokenTogether) {
 }
 
 TEST(Validate, AcceptsTheLimitsThemselves) {
-  Asset asset = bounded_asset();
+  Asset asset = tapered_asset();
   asset.parts[2].shape.e1 = kMinExponent;
   asset.parts[2].shape.e2 = kMaxExponent;
   asset.provenance.generator.assign(4096, 'x');

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // What stands behind a correct content hash: the arrays of a bundle with arbitrary content. The input is a
-// list of edits of the arrays of test::bounded_asset(): which array, where, how many bytes, the bytes.
+// list of edits of the arrays of test::tapered_asset(): which array, where, how many bytes, the bytes.
 #include <algorithm>
 #include <cstring>
 #include <utility>
@@ -61,15 +61,16 @@ void resize_rows(Document& document, std::size_t id, Edits& edits) {
 }  // namespace
 
 std::vector<Bytes> sqmap::fuzz::seeds() {
-  // No edit; an exponent of part 1; another layout; longer crossings.
+  // No edit; an exponent of part 1; its taper; another layout; longer crossings.
   return {{},
           {9 + 18 + 1, 0x18, 0, 8, 0, 0, 0, 0, 0, 0, 0xF0, 0x3F},
+          {9 + 18 + 24, 8, 0, 8, 0, 0, 0, 0, 0, 0, 0xE0, 0x3F},
           {9 + 18 + 10, 0, 0, 4, 9, 0, 0, 0},
-          {9 + 18 + 24 + 14, 200, 0, 9 + 18 + 24 + 15, 200, 0, 9 + 18 + 10, 0x30, 0, 4, 200, 0, 0, 0}};
+          {9 + 18 + 25 + 14, 200, 0, 9 + 18 + 25 + 15, 200, 0, 9 + 18 + 10, 0x30, 0, 4, 200, 0, 0, 0}};
 }
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  static const Document kDocument = sqmap::io::to_document(sqmap::test::bounded_asset());
+  static const Document kDocument = sqmap::io::to_document(sqmap::test::tapered_asset());
   Document document = kDocument;
   Edits edits(data, size);
   constexpr std::size_t kTexts = sqmap::io::kTextCount, kNumbers = sqmap::io::kNumberCount,

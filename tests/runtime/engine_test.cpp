@@ -66,13 +66,14 @@ std::string target_name(const testing::TestParamInfo<SimdTarget>& target) {
 INSTANTIATE_TEST_SUITE_P(Engine, EveryTarget, testing::ValuesIn(kTargets), target_name);
 
 TEST_P(EveryTarget, AnswersLikeTheSinglePointToTheLastBit) {
-  const Asset asset = test::mixed_asset();
-  const Object object = built(asset);
-  const std::vector<Vec3f> points = test::points_around(asset, 3000, 21);
-  Batch batch(points.size());
-  for (const Layer layer : {Layer::kOne, Layer::kTwo, Layer::kThree, Layer::kAuto}) {
-    for (const std::uint32_t level : {0U, 1U, 7U}) {
-      for (const float edge_m : {0.0F, 0.2F}) {
+  for (const double taper_share : {0.0, 0.9}) {
+    const Asset asset = test::mixed_asset(9, taper_share);
+    const Object object = built(asset);
+    const std::vector<Vec3f> points = test::points_around(asset, 3000, 21);
+    Batch batch(points.size());
+    for (const Layer layer : {Layer::kOne, Layer::kTwo, Layer::kThree, Layer::kAuto}) {
+      for (const auto& [level, edge_m] :
+           {std::pair{0U, 0.0F}, {0U, 0.2F}, {1U, 0.0F}, {1U, 0.2F}, {7U, 0.0F}, {7U, 0.2F}}) {
         const QueryOptions options{layer, level, edge_m};
         object.query(points, batch.answers(), options);
         int differing = 0, inside = 0, known = 0, nowhere = 0;
@@ -83,7 +84,8 @@ TEST_P(EveryTarget, AnswersLikeTheSinglePointToTheLastBit) {
           known += !std::isnan(one.signed_distance_m);
           nowhere += one.part == kNowhere;
         }
-        EXPECT_EQ(differing, 0) << "layer " << int(layer) << ", level " << level << ", edge " << edge_m;
+        EXPECT_EQ(differing, 0) << "layer " << int(layer) << ", level " << level << ", edge " << edge_m
+                                << ", taper " << taper_share;
         EXPECT_GT(inside, 500);
         EXPECT_GT(nowhere, 100);
         EXPECT_EQ(known > 1000, layer != Layer::kOne) << known;
@@ -111,8 +113,8 @@ Asset with_adverse_bounds(Asset asset) {
 }
 
 TEST_P(EveryTarget, NeverContradictsASureAnswer) {
-  const Asset asset = with_adverse_bounds(test::mixed_asset());
-  const Object object = built(asset), bare = built(test::mixed_asset());
+  const Asset plain = test::mixed_asset(9, 0.7), asset = with_adverse_bounds(plain);
+  const Object object = built(asset), bare = built(plain);
   const std::vector<Vec3f> points = test::points_around(asset, 4000, 32);
   const PointBody body = PointBody::build(points).value();
   std::vector<Certainty> told(points.size());
@@ -228,7 +230,8 @@ TEST(Engine, FirstLayerAgreesWithTheExactFunction) {
     for (const double e2 : {0.1, 0.6, 1.0, 2.0}) {
       Asset asset = test::mixed_asset();
       asset.parts.resize(1);
-      asset.parts[0].shape = {{0.5, 0.3, 0.8}, e1, e2};
+      const double taper_share = e2 == 0.6 ? 0.95 : e2 == 1.0 ? -0.4 : 0;
+      asset.parts[0].shape = {{0.5, 0.3, 0.8}, e1, e2, taper_share * max_taper(e1)};
       asset.parts[0].object_from_part = {};
       const Resident resident(asset);
       const double per_m = resident.units_per_m();
@@ -254,15 +257,19 @@ TEST(Engine, SlabsTouchTheSuperquadricFromOutside) {
   std::uniform_real_distribution<double> angle(0, std::acos(0.0));
   for (const double e1 : {0.1, 0.5, 1.0, 1.6, 2.0}) {
     for (const double e2 : {0.1, 0.7, 1.0, 2.0}) {
-      const Vec3d a{0.5, 0.3, 0.8};
-      const Slabs slabs = Slabs::of({2, static_cast<float>(1 / 0.3), 1.25F}, e1, e2);
+      const double taper_share = e2 == 0.7 ? 0.95 : e2 == 1.0 ? -0.4 : 0;
+      const Superquadric shape{{0.5, 0.3, 0.8}, e1, e2, taper_share * max_taper(e1)};
+      const Vec3d a = half_extents_m(shape);
+      const Slabs slabs =
+          Slabs::of({static_cast<float>(1 / a.x), static_cast<float>(1 / a.y), static_cast<float>(1 / a.z)},
+                    e1, e2, shape.taper);
       double across = 0, up = 0, diagonal = 0;
       for (int i = 0; i < 40000; ++i) {
-        const double eta = angle(rng), omega = angle(rng);
+        const double eta = angle(rng), omega = angle(rng), side = i % 2 == 0 ? 1 : -1;
         const Vec3d d{std::cos(eta) * std::cos(omega) * a.x, std::cos(eta) * std::sin(omega) * a.y,
-                      std::sin(eta) * a.z};
-        const Vec3d r = (1 / inside_outside_radial({a, e1, e2}, d)) * d;
-        const Vec3d w{r.x / a.x, r.y / a.y, r.z / a.z};
+                      side * std::sin(eta) * a.z};
+        const Vec3d r = (1 / inside_outside_radial(shape, d)) * d;
+        const Vec3d w{r.x / a.x, r.y / a.y, side * r.z / a.z};
         across = std::max(across, w.x + w.y);
         up = std::max(up, std::max(w.x, w.y) + w.z);
         diagonal = std::max(diagonal, w.x + w.y + w.z);
@@ -328,7 +335,7 @@ TEST(Resident, TakesTheBytesItsFormulaSays) {
     if (!part.map.vertex_samples.empty()) bytes += blocks + 8 * part.map.vertex_samples.size();
   }
   EXPECT_EQ(Resident(asset).size(), bytes);
-  EXPECT_LT(sizeof(PartRecord), 256U);
+  EXPECT_LE(sizeof(PartRecord), 256U);
   EXPECT_GT(built(asset).resident_bytes(), bytes);
   EXPECT_LT(built(asset).resident_bytes(), bytes + 200);
 }

@@ -78,15 +78,30 @@ double time_on_ball(const Vec3d& a, const Vec3d& b, double radius_m) {
   return t >= 0 && t <= 1 ? t : 2;
 }
 
-TEST(Sweep, MeetsABallWhereTheLineDoes) {
+/// The same ball in a superquadric that narrows upwards.
+const Swept& ball_in_taper() {
+  static const Swept kSwept = Swept::of(
+      test::asset_of({test::traced_part({{1.35, 1.35, 1.45}, 1, 1, -0.3}, {}, 65, 128, 1, 1.2,
+                                        [](const Vec3d& o, const Vec3d& d, bool& inside) {
+                                          return test::union_crossings_m({{kCentre, kRadius}}, o, d, inside);
+                                        })},
+                     2 * kRadius));
+  return kSwept;
+}
+
+class SweptBall : public testing::TestWithParam<const Swept& (*)()> {};
+INSTANTIATE_TEST_SUITE_P(Sweep, SweptBall, testing::Values(&ball, &ball_in_taper));
+
+TEST_P(SweptBall, IsMetWhereTheLineDoes) {
+  const Swept& swept = GetParam()();
   std::mt19937_64 rng(1);
-  const Instance instance = ball().at();
+  const Instance instance = swept.at();
   int hits = 0, misses = 0, steps = 0;
   for (int i = 0; i < 1500; ++i) {
     // Through a place that is as likely within the ball as beside it.
     const Vec3d a = kCentre + 4.0 * random_direction(rng), through = kCentre + 1.1 * random_direction(rng),
                 b = through + 0.6 * (through - a);
-    const SweepResult result = ball().sweeper.sweep(instance, {cast<float>(a), cast<float>(b)}, kOptions);
+    const SweepResult result = swept.sweeper.sweep(instance, {cast<float>(a), cast<float>(b)}, kOptions);
     // The contact lies between those with a ball larger and one smaller by all errors.
     const double slack_m = kTolerance_m + kMapError_m;
     const double soonest = time_on_ball(a, b, kRadius + slack_m),

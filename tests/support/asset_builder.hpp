@@ -116,6 +116,17 @@ inline Asset bounded_asset() {
   return asset;
 }
 
+/// bounded_asset() with two of its parts tapered: everything that version 1.2 can hold.
+///
+/// tests/formats/golden/v1_2.h5 is encode() of it.
+inline Asset tapered_asset() {
+  Asset asset = bounded_asset();
+  asset.parts[0].shape.taper = 0.125;
+  asset.parts[2].shape.taper = -0.75;
+  asset.parts[2].sphere.radius_m = 1;
+  return asset;
+}
+
 inline bool same_bits(double a, double b) {
   return std::bit_cast<std::uint64_t>(a) == std::bit_cast<std::uint64_t>(b);
 }

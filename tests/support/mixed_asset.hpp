@@ -19,14 +19,15 @@ inline const std::vector<Ball>& mixed_balls() {
   return kBalls;
 }
 
-inline Asset mixed_asset(std::uint32_t bits = 9) {
+/// `taper_share` of max_taper, or its negative, for every other part.
+inline Asset mixed_asset(std::uint32_t bits = 9, double taper_share = 0) {
   const std::vector<Ball>& balls = mixed_balls();
   struct Shape {
     Superquadric shape;
     Pose pose;
     std::uint32_t rows, cols, levels;
   };
-  const Shape shapes[] = {
+  Shape shapes[] = {
       {{{0.7, 0.6, 0.65}, 0.4, 0.7}, {{0.9, 0.1, 0.3, -0.2}, {-0.4, 0, 0}}, 33, 64, 3},
       {{{0.6, 0.5, 0.6}, 1.0, 1.0}, {{1, 0, 0, 0}, {0.42, 0.1, 0}}, 17, 48, 2},
       {{{0.4, 0.5, 0.45}, 1.4, 0.3}, {{0.5, 0.5, -0.5, 0.5}, {0, 0.1, 1.1}}, 65, 32, 3},
@@ -34,7 +35,8 @@ inline Asset mixed_asset(std::uint32_t bits = 9) {
   };
   std::mt19937_64 rng(4);
   std::vector<Part> parts;
-  for (const Shape& s : shapes) {
+  for (Shape& s : shapes) {
+    s.shape.taper = (parts.size() % 2 == 0 ? taper_share : -taper_share) * max_taper(s.shape.e1);
     const Rotation<double> turn = rotation<double>(s.pose.orientation);
     Part part = traced_part(s.shape, {}, s.rows, s.cols, s.levels, 1.3,
                             [&](const Vec3d& origin_m, const Vec3d& direction, bool& inside) {

@@ -97,6 +97,7 @@ typedef struct sqmap_part_desc {
   const uint32_t* vertex_cell;   // [vertex_sample_count], ascending
   const uint8_t* vertex_256ths;  // [2 * vertex_sample_count]: along the rows, along the columns
   const uint16_t* vertex_code;   // [vertex_sample_count]
+  double taper;                  // K; 0: a rigid superquadric
 } sqmap_part_desc;
 
 typedef struct sqmap_asset_desc {

@@ -10,22 +10,23 @@ namespace sqmap {
 
 /// Nodes of one quadrant of a superellipse at equal arc lengths, FORMAT.md (S6).
 ///
-/// The curve is (alpha c(theta), beta s(theta)), theta from 0 to pi/2 the polar angle of the unit
-/// superellipse. Node 0 is exactly (1, 0), node `cells` exactly (0, 1). Deterministic; cost is a fixed number
-/// of evaluations.
+/// The curve is (alpha c(theta) (1 + taper s(theta)), beta s(theta)), theta from 0 to pi/2 the polar angle of
+/// the unit superellipse. Node 0 is exactly (1, 0), node `cells` exactly (0, 1). Deterministic; cost is a
+/// fixed number of evaluations.
 ///
 /// @param alpha,beta  semi-axes [m], > 0
 /// @param e           exponent of the curve
 /// @param cells       arcs of equal length, >= 1
-/// @return            cells + 1 points
+/// @param taper       of a meridian, on the side of +s; above -1
+/// @return            cells + 1 points of the unit superellipse, without the taper
 std::vector<SuperellipsePoint<double>> quadrant_nodes(double alpha_m, double beta_m, double e,
-                                                      std::uint32_t cells);
+                                                      std::uint32_t cells, double taper = 0);
 
 /// Where the nodes of a distance map lie on its superquadric, and where their rays point. Part frame.
 ///
-/// Rows follow the meridian superellipse with semi-axes (sqrt(a1 a2), a3) and exponent e1, columns the
-/// equator with (a1, a2) and e2, each at equal arc lengths (in place of the paper's eq. (9), whose spacing
-/// ignores the axes).
+/// Rows follow the meridian superellipse with semi-axes (sqrt(a1 a2), a3), exponent e1 and the taper, columns
+/// the equator with (a1, a2) and e2, each at equal arc lengths (in place of the paper's eq. (9), whose
+/// spacing ignores the axes).
 class MapGrid {
  public:
   /// rows - 1 must be a positive multiple of 2, cols a positive multiple of 4.
@@ -47,14 +48,12 @@ class MapGrid {
     return surface_normal(shape_, eta(row), omega(col));
   }
 
-  /// Nodes of the first quadrant, from the equator (or omega = 0) on; shapes [rows/2 + 1] and [cols/4 + 1].
-  const std::vector<SuperellipsePoint<double>>& eta_quadrant() const noexcept { return eta_; }
-  const std::vector<SuperellipsePoint<double>>& omega_quadrant() const noexcept { return omega_; }
-
  private:
   Superquadric shape_;
   std::uint32_t rows_, cols_;
-  std::vector<SuperellipsePoint<double>> eta_, omega_;
+  // Of one quadrant, from the equator (or omega = 0) on; below the equator only where a taper tells them
+  // apart.
+  std::vector<SuperellipsePoint<double>> eta_, eta_below_, omega_;
 };
 
 }  // namespace sqmap

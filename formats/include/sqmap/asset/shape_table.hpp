@@ -64,19 +64,33 @@ struct CurveTable {
     return place;
   }
 
-  /// The superellipse with semi-axes alpha and beta and exponent e.
-  static CurveTable of(double alpha_m, double beta_m, double e) {
-    const auto points = quadrant_nodes(alpha_m, beta_m, e, kCells);
+  /// The curve (c (1 + taper s), s): the quadrant of a tapered meridian that lies on the side of +s. Its arcs
+  /// are of equal length where of() knew the taper.
+  CurveTable tapered(T taper) const noexcept {
+    CurveTable table = *this;
+    for (int k = 0; k <= kCells; ++k) {
+      const T width = T(1) + taper * s[k];
+      table.c[k] = c[k] * width;
+      table.c_step[k] = c_step[k] * width + taper * (c[k] * s_step[k]);
+    }
+    return table;
+  }
+
+  /// The superellipse with semi-axes alpha and beta and exponent e, at places where the same with the taper
+  /// has arcs of equal length.
+  static CurveTable of(double alpha_m, double beta_m, double e, double taper = 0) {
+    const auto points = quadrant_nodes(alpha_m, beta_m, e, kCells, taper);
+    const auto c_of = [&](int k) { return points[k].c * (1 + taper * points[k].s); };
     double length_m = 0;
     for (int k = 0; k < kCells; ++k) {
-      length_m +=
-          std::hypot(alpha_m * (points[k + 1].c - points[k].c), beta_m * (points[k + 1].s - points[k].s));
+      length_m += std::hypot(alpha_m * (c_of(k + 1) - c_of(k)), beta_m * (points[k + 1].s - points[k].s));
     }
     CurveTable table;
     for (int k = 0; k <= kCells; ++k) {
       // The tangent is (-s_power, c_power) in unit coordinates; scaled so that its length is one arc.
       const auto& p = points[k];
-      const double speed = length_m / kCells / std::hypot(alpha_m * p.s_power, beta_m * p.c_power);
+      const double c_way = p.s_power * (1 + taper * p.s) - taper * (p.c * p.c_power);
+      const double speed = length_m / kCells / std::hypot(alpha_m * c_way, beta_m * p.c_power);
       table.c[k] = T(p.c);
       table.s[k] = T(p.s);
       table.c_step[k] = T(-p.s_power * speed);
@@ -97,9 +111,10 @@ struct CurveTable {
 };
 
 /// Tables that answer, without powers, where the foot point of a query lies and what the surface is there:
-/// r(eta, omega) is a product of two 1-D curves. Every operation is one that IEEE 754 rounds exactly, in an
-/// order that the runtime's SIMD kernels follow, so that their answers equal these to the last bit.
-/// Immutable once prepared, thread-safe, allocates nothing.
+/// r(eta, omega) is a product of two 1-D curves. A tapered meridian has two halves, either a quadrant of its
+/// own. Every operation is one that IEEE 754 rounds exactly, in an order that the runtime's SIMD kernels
+/// follow, so that their answers equal these to the last bit. Immutable once prepared, thread-safe, allocates
+/// nothing.
 template <class T>
 struct ShapeTable {
   static constexpr int kCells = CurveTable<T>::kCells;
@@ -116,20 +131,22 @@ struct ShapeTable {
 
   ShapeTable() = default;
   ShapeTable(const Superquadric& shape, std::uint32_t rows, std::uint32_t cols) {
-    eta = CurveTable<T>::of(std::sqrt(shape.semi_axes_m.x * shape.semi_axes_m.y), shape.semi_axes_m.z,
-                            shape.e1);
+    const double across_m = std::sqrt(shape.semi_axes_m.x * shape.semi_axes_m.y);
+    eta = CurveTable<T>::of(across_m, shape.semi_axes_m.z, shape.e1, shape.taper);
+    if (shape.taper != 0)
+      eta_below = CurveTable<T>::of(across_m, shape.semi_axes_m.z, shape.e1, -shape.taper);
     omega = CurveTable<T>::of(shape.semi_axes_m.x, shape.semi_axes_m.y, shape.e2);
-    prepare(cast<T>(shape.semi_axes_m), rows, cols);
+    prepare(cast<T>(shape.semi_axes_m), T(shape.taper), rows, cols);
   }
-  /// Sets all but the curves.
-  void prepare(const Vec3<T>& semi_axes_m, std::uint32_t rows, std::uint32_t cols) noexcept;
+  /// Sets the rest from the curves `eta` and `eta_below`, not yet tapered, and `omega`.
+  void prepare(const Vec3<T>& semi_axes_m, T taper, std::uint32_t rows, std::uint32_t cols) noexcept;
 
   /// The nearest point of the surface to m (part frame, any finite point), as S, row and col.
   ///
   /// The paper maximises the cosine I_S of eq. (19), which has several maxima and is 0/0 on the surface; here
-  /// the squared distance is minimised. By symmetry the foot lies in the octant of m. The nearest of 8 x 8
-  /// points of that octant is refined by Newton's method on the continuous surface, kept downhill by bounds
-  /// on the curvature and on the step.
+  /// the squared distance is minimised. By symmetry the foot lies in the octant of m, or on a tapered shape
+  /// in the quadrant of m_x and m_y. The nearest of 8 x 8 points an octant is refined by Newton's method on
+  /// the continuous surface, kept downhill by bounds on the curvature and on the step.
   Foot<T> foot(const Vec3<T>& m) const noexcept;
 
   /// The surface at (row, col), row in [0, rows - 1], col taken modulo cols.
@@ -140,6 +157,7 @@ struct ShapeTable {
   T eta_per_row, omega_per_col;  ///< table cells a map cell
   T row_per_eta, col_per_omega;
   CurveTable<T> eta, omega;
+  T taper;
 
   /// Constants of the foot search: |r - m|^2 over (i, j) is least where
   /// c_i (W_j - c_i square_j / 2) + z_i m_z - z_i^2 / 2  is greatest, W_j = x_j m_x + y_j m_y.
@@ -149,7 +167,21 @@ struct ShapeTable {
   };
   Scan scan;
 
+  // Of a tapered shape only: the half below the equator, mirrored.
+  CurveTable<T> eta_below;
+  Scan scan_below;
+
  private:
+  bool is_tapered() const noexcept { return taper != T(0); }
+  /// The meridian at u, counted downwards from the equator where it is negative.
+  typename CurveTable<T>::Place eta_at(T u) const noexcept {
+    if (!is_tapered() || !(u < T(0))) return eta.at(u);
+    const auto e = eta_below.at(-u);
+    return {e.c, -e.s, -e.c_1, e.s_1, e.c_2, -e.s_2};
+  }
+  Scan scan_of(const CurveTable<T>& meridian) const noexcept;
+  /// Moves (u, v) to the start point nearest to m where it is nearer than those before.
+  static void choose_start(const Scan& scan, const Vec3<T>& m, T& u, T& v, T& most) noexcept;
   void newton_step(const Vec3<T>& m, T& u, T& v) const noexcept;
   /// Unnormalised outward normal in the octant: the cross product of the tangents without the factor c of
   /// eta.
@@ -162,7 +194,8 @@ struct ShapeTable {
 };
 
 template <class T>
-void ShapeTable<T>::prepare(const Vec3<T>& semi_axes_m, std::uint32_t rows, std::uint32_t cols) noexcept {
+void ShapeTable<T>::prepare(const Vec3<T>& semi_axes_m, T shape_taper, std::uint32_t rows,
+                            std::uint32_t cols) noexcept {
   axes_m = semi_axes_m;
   inverse_axes = {T(1) / axes_m.x, T(1) / axes_m.y, T(1) / axes_m.z};
   half_rows = T(rows - 1) / T(2);
@@ -171,25 +204,61 @@ void ShapeTable<T>::prepare(const Vec3<T>& semi_axes_m, std::uint32_t rows, std:
   omega_per_col = T(kCells) / quarter_cols;
   row_per_eta = half_rows / T(kCells);
   col_per_omega = quarter_cols / T(kCells);
+  taper = shape_taper;
+  if (is_tapered()) {
+    eta_below = eta_below.tapered(-taper);
+    scan_below = scan_of(eta_below);
+    eta = eta.tapered(taper);
+  }
+  scan = scan_of(eta);
+}
+
+template <class T>
+typename ShapeTable<T>::Scan ShapeTable<T>::scan_of(const CurveTable<T>& meridian) const noexcept {
+  Scan out;
   for (int k = 0; k < kScan; ++k) {
     const int node = scan_node(k);
-    scan.x_m[k] = axes_m.x * omega.c[node];
-    scan.y_m[k] = axes_m.y * omega.s[node];
-    scan.c[k] = eta.c[node];
-    scan.z_m[k] = axes_m.z * eta.s[node];
-    scan.half_z_square_m2[k] = T(0.5) * scan.z_m[k] * scan.z_m[k];
+    out.x_m[k] = axes_m.x * omega.c[node];
+    out.y_m[k] = axes_m.y * omega.s[node];
+    out.c[k] = meridian.c[node];
+    out.z_m[k] = axes_m.z * meridian.s[node];
+    out.half_z_square_m2[k] = T(0.5) * out.z_m[k] * out.z_m[k];
   }
   for (int i = 0; i < kScan; ++i) {
-    const T half = T(0.5) * scan.c[i];
+    const T half = T(0.5) * out.c[i];
     for (int j = 0; j < kScan; ++j) {
-      scan.half_square_m2[i][j] = half * (scan.x_m[j] * scan.x_m[j] + scan.y_m[j] * scan.y_m[j]);
+      out.half_square_m2[i][j] = half * (out.x_m[j] * out.x_m[j] + out.y_m[j] * out.y_m[j]);
+    }
+  }
+  return out;
+}
+
+template <class T>
+void ShapeTable<T>::choose_start(const Scan& scan, const Vec3<T>& m, T& u, T& v, T& most) noexcept {
+  T along[kScan];
+  for (int j = 0; j < kScan; ++j) along[j] = scan.x_m[j] * m.x + scan.y_m[j] * m.y;
+  for (int i = 0; i < kScan; ++i) {
+    T row_most = along[0] - scan.half_square_m2[i][0];
+    T row_v = T(scan_node(0));
+    for (int j = 1; j < kScan; ++j) {
+      const T here = along[j] - scan.half_square_m2[i][j];
+      if (here > row_most) {
+        row_most = here;
+        row_v = T(scan_node(j));
+      }
+    }
+    const T here = scan.c[i] * row_most + (scan.z_m[i] * m.z - scan.half_z_square_m2[i]);
+    if (here > most) {
+      most = here;
+      u = T(scan_node(i));
+      v = row_v;
     }
   }
 }
 
 template <class T>
 void ShapeTable<T>::newton_step(const Vec3<T>& m, T& u, T& v) const noexcept {
-  const auto e = eta.at(u), o = omega.at(v);
+  const auto e = eta_at(u), o = omega.at(v);
   // r = (x e.c, y e.c, z e.s) and derivatives; d = r - m.
   const T x = axes_m.x * o.c, y = axes_m.y * o.s;
   const T x_1 = axes_m.x * o.c_1, y_1 = axes_m.y * o.s_1;
@@ -213,7 +282,8 @@ void ShapeTable<T>::newton_step(const Vec3<T>& m, T& u, T& v) const noexcept {
   const T inverse = T(1) / (regular ? determinant : product);
   const T du = (coupling * g_v - h_vv * g_u) * inverse;
   const T dv = (coupling * g_u - h_uu * g_v) * inverse;
-  u = lesser(greater(u + lesser(greater(du, -kMostStep), kMostStep), T(0)), T(kCells));
+  const T lowest = is_tapered() ? T(-kCells) : T(0);
+  u = lesser(greater(u + lesser(greater(du, -kMostStep), kMostStep), lowest), T(kCells));
   v = lesser(greater(v + lesser(greater(dv, -kMostStep), kMostStep), T(0)), T(kCells));
 }
 
@@ -221,30 +291,18 @@ template <class T>
 Foot<T> ShapeTable<T>::foot(const Vec3<T>& point) const noexcept {
   using std::abs;
   using std::sqrt;
-  const Vec3<T> m{abs(point.x), abs(point.y), abs(point.z)};
-  T along[kScan];
-  for (int j = 0; j < kScan; ++j) along[j] = scan.x_m[j] * m.x + scan.y_m[j] * m.y;
+  const Vec3<T> m{abs(point.x), abs(point.y), is_tapered() ? point.z : abs(point.z)};
   T u = 0, v = 0, most = -std::numeric_limits<T>::infinity();
-  for (int i = 0; i < kScan; ++i) {
-    T row_most = along[0] - scan.half_square_m2[i][0];
-    T row_v = T(scan_node(0));
-    for (int j = 1; j < kScan; ++j) {
-      const T here = along[j] - scan.half_square_m2[i][j];
-      if (here > row_most) {
-        row_most = here;
-        row_v = T(scan_node(j));
-      }
-    }
-    const T here = scan.c[i] * row_most + (scan.z_m[i] * m.z - scan.half_z_square_m2[i]);
-    if (here > most) {
-      most = here;
-      u = T(scan_node(i));
-      v = row_v;
-    }
+  choose_start(scan, m, u, v, most);
+  if (is_tapered()) {
+    const T above = most;
+    T u_below = u;
+    choose_start(scan_below, {m.x, m.y, -m.z}, u_below, v, most);
+    u = most > above ? -u_below : u;
   }
   for (int step = 0; step < kNewtonSteps; ++step) newton_step(m, u, v);
 
-  const auto e = eta.at(u), o = omega.at(v);
+  const auto e = eta_at(u), o = omega.at(v);
   const T x = axes_m.x * o.c, y = axes_m.y * o.s;
   const T dx = x * e.c - m.x, dy = y * e.c - m.y, dz = axes_m.z * e.s - m.z;
   const Vec3<T> n = normalized(gradient(e, o));
@@ -256,7 +314,7 @@ Foot<T> ShapeTable<T>::foot(const Vec3<T>& point) const noexcept {
   foot.cell_m = sqrt((e.c_1 * e.c_1) * (x * x + y * y) + z_1 * z_1) * eta_per_row +
                 (e.c * sqrt(x_1 * x_1 + y_1 * y_1)) * omega_per_col;
   const T du = u * row_per_eta, dv = v * col_per_omega;
-  foot.row = point.z < T(0) ? half_rows - du : half_rows + du;
+  foot.row = point.z < T(0) && !is_tapered() ? half_rows - du : half_rows + du;
   const T turn = T(4) * quarter_cols, half_turn = T(2) * quarter_cols;
   if (point.y < T(0)) {
     foot.col = point.x < T(0) ? dv : half_turn - dv;
@@ -272,7 +330,7 @@ SurfaceSample<T> ShapeTable<T>::sample(T row, T col) const noexcept {
   using std::abs;
   const T up = row - half_rows;
   const T z_sign = up < T(0) ? T(-1) : T(1);
-  const auto e = eta.at(abs(up) * eta_per_row);
+  const auto e = (up < T(0) && is_tapered() ? eta_below : eta).at(abs(up) * eta_per_row);
 
   const T turn = T(4) * quarter_cols;
   T wrapped = col < T(0) ? col + turn : col;

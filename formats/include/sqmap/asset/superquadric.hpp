@@ -13,15 +13,24 @@ namespace sqmap {
 inline constexpr double kMinExponent = 0.1;
 inline constexpr double kMaxExponent = 2.0;
 
-/// Superquadric (superellipsoid) shape in its own part frame, centred at the origin.
+/// Superquadric (superellipsoid) shape in its own part frame, centred at the origin; tapered along z: what
+/// lies at the height z is widened by 1 + taper z/a3 (paper eq. (2) with K_x = K_y = taper).
 template <class T>
 struct SuperquadricOf {
   Vec3<T> semi_axes_m{T(1), T(1), T(1)};  ///< a1, a2, a3 > 0 [m]
   T e1{1};                                ///< squareness along the meridians (eta), in [0.1, 2]
   T e2{1};                                ///< squareness along the parallels (omega), in [0.1, 2]
+  T taper{0};                             ///< K, within +- max_taper(e1); 0: rigid
   friend bool operator==(const SuperquadricOf&, const SuperquadricOf&) = default;
 };
 using Superquadric = SuperquadricOf<double>;
+
+/// The largest taper K at which a superquadric with the exponent e1 is convex: (1 - e1/2) 2^(e1/2), below 1.
+///
+/// At the height w = z/a3 the cross-section has the width c(w) (1 + K w), c = (1 - |w|^q)^(1/q), q = 2/e1;
+/// the body is convex where that is concave. Its second derivative is nowhere positive exactly if q - 1 >=
+/// |K| w (q + 1 - 2 w^q) on [0, 1]; the right side is greatest at w^q = 1/2.
+inline double max_taper(double e1) noexcept { return (1 - e1 / 2) * std::exp2(e1 / 2); }
 
 /// |(u, v)| in the p-norm with p = 2/e, for u, v >= 0:  m (1 + (n/m)^p)^(1/p), m = max, n = min.
 ///
@@ -37,13 +46,41 @@ T superellipse_norm(const T& u, const T& v, const T& e) noexcept {
   return m * pow(T(1) + pow(n / m, T(2) / e), e / T(2));
 }
 
+/// The t for which (u, w) / t lies on the meridian of a tapered superquadric, FORMAT.md (S7):
+///
+///     | ( u / (t + K w), w / t ) |_{2/e} = 1
+///
+/// The left side falls with t and is convex, so that Newton's method climbs from a t that is too small to the
+/// root without passing it.
+///
+/// @param u  distance from the axis over that of the surface at the equator, >= 0
+/// @param w  z/a3
+template <class T>
+T tapered_radial(const T& u, const T& w, const T& taper, const T& e) noexcept {
+  using std::abs;
+  using std::pow;
+  constexpr int kMostSteps = 32;   // 5 are usual; a double has no more to gain from these
+  const T across = u - taper * w;  // each term alone is 1 or less from here, or from |w|
+  T t = abs(w) > across ? abs(w) : across;
+  for (int k = 0; k < kMostSteps && t > T(0); ++k) {
+    const T width = t + taper * w;
+    const T x = u / width, y = abs(w) / t;
+    const T n = superellipse_norm<T>(x, y, e);
+    const T slope = n * (pow(x / n, T(2) / e) / width + pow(y / n, T(2) / e) / t);
+    const T next = t + (n - T(1)) / slope;
+    if (!(next > t)) break;  // NaN too
+    t = next;
+  }
+  return t;
+}
+
 /// Radial form of the inside-outside function, FORMAT.md (S1):
 ///
 ///     beta(p) = | ( |(x/a1, y/a2)|_{2/e2} , z/a3 ) |_{2/e1}
 ///
 /// beta < 1 inside, 1 on the surface, > 1 outside; beta(t p) = t beta(p) for t >= 0; the paper's F is beta^2.
 /// beta is not a distance. Source: Barr 1981; Moustakas et al. 2007, eq. (1) with its misprint 2/e^2 read as
-/// 2/e2.
+/// 2/e2. Of a tapered superquadric: the same multiple of its surface, (S7).
 ///
 /// @param p  query point, part frame [m]
 /// @return   beta [-], finite for finite input short of overflow of p/a
@@ -51,6 +88,7 @@ template <class T>
 T inside_outside_radial(const SuperquadricOf<T>& sq, const Vec3<T>& p) noexcept {
   using std::abs;
   const T u = superellipse_norm<T>(abs(p.x) / sq.semi_axes_m.x, abs(p.y) / sq.semi_axes_m.y, sq.e2);
+  if (sq.taper != T(0)) return tapered_radial<T>(u, p.z / sq.semi_axes_m.z, sq.taper, sq.e1);
   return superellipse_norm<T>(u, abs(p.z) / sq.semi_axes_m.z, sq.e1);
 }
 
@@ -95,15 +133,27 @@ SuperellipsePoint<T> superellipse_point(const T& cos_angle, const T& sin_angle, 
 template <class T>
 Vec3<T> surface_point(const SuperquadricOf<T>& sq, const SuperellipsePoint<T>& eta,
                       const SuperellipsePoint<T>& omega) noexcept {
-  return {sq.semi_axes_m.x * eta.c * omega.c, sq.semi_axes_m.y * eta.c * omega.s, sq.semi_axes_m.z * eta.s};
+  const T width = T(1) + sq.taper * eta.s;
+  return {sq.semi_axes_m.x * eta.c * omega.c * width, sq.semi_axes_m.y * eta.c * omega.s * width,
+          sq.semi_axes_m.z * eta.s};
 }
 
-/// Outward unit normal at r(eta, omega), FORMAT.md (S5). Finite for every angle and exponent in range.
+/// An outward vector along the normal at r(eta, omega), FORMAT.md (S5). Finite for every angle and exponent
+/// in range.
+template <class T>
+Vec3<T> surface_gradient(const SuperquadricOf<T>& sq, const SuperellipsePoint<T>& eta,
+                         const SuperellipsePoint<T>& omega) noexcept {
+  const T width = T(1) + sq.taper * eta.s;
+  const T lean = sq.taper * (eta.c * eta.c_power) / width;
+  return {eta.c_power * omega.c_power / (sq.semi_axes_m.x * width),
+          eta.c_power * omega.s_power / (sq.semi_axes_m.y * width), (eta.s_power - lean) / sq.semi_axes_m.z};
+}
+
+/// Outward unit normal at r(eta, omega).
 template <class T>
 Vec3<T> surface_normal(const SuperquadricOf<T>& sq, const SuperellipsePoint<T>& eta,
                        const SuperellipsePoint<T>& omega) noexcept {
-  return normalized(Vec3<T>{eta.c_power * omega.c_power / sq.semi_axes_m.x,
-                            eta.c_power * omega.s_power / sq.semi_axes_m.y, eta.s_power / sq.semi_axes_m.z});
+  return normalized(surface_gradient(sq, eta, omega));
 }
 
 /// Outward unit normal of the superquadric through p (the direction of grad beta at p), part frame.
@@ -115,9 +165,11 @@ Vec3<T> normal_at(const SuperquadricOf<T>& sq, const Vec3<T>& p) noexcept {
   const T u = superellipse_norm<T>(abs(x), abs(y), sq.e2);
   const SuperellipsePoint<T> omega =
       u > T(0) ? superellipse_point<T>(x / u, y / u, sq.e2) : SuperellipsePoint<T>{T(1), T(0), T(1), T(0)};
-  const T beta = superellipse_norm<T>(u, abs(z), sq.e1);
+  const bool tapered = sq.taper != T(0);
+  const T beta = tapered ? tapered_radial<T>(u, z, sq.taper, sq.e1) : superellipse_norm<T>(u, abs(z), sq.e1);
   if (!(beta > T(0))) return {};
-  const SuperellipsePoint<T> eta = superellipse_point<T>(u / beta, z / beta, sq.e1);
+  const T width = tapered ? beta + sq.taper * z : beta;
+  const SuperellipsePoint<T> eta = superellipse_point<T>(u / width, z / beta, sq.e1);
   return surface_normal(sq, eta, omega);
 }
 
@@ -132,11 +184,49 @@ inline double largest_on_superellipse(double alpha, double beta, double e) noexc
   return most * std::pow(1 + std::pow(least / most, q), 1 / q);
 }
 
-/// Radius of the smallest ball around the centre that holds the superquadric, exactly [m].
+/// Bounds from above of width(w) = c(w) (1 + taper w), the half width of a superquadric at the height w =
+/// z/a3 over that at its equator, and of its sums with heights: the largest of `value(width, |w|)`, which
+/// rises with both.
+template <class Value>
+double largest_over_heights(double taper, double e1, const Value& value) noexcept {
+  constexpr int kSteps = 512;  // a side; between two heights the lower one's c and the upper one's |w| count
+  double largest = 0;
+  for (int k = 0; k < kSteps; ++k) {
+    const double low = static_cast<double>(k) / kSteps, high = static_cast<double>(k + 1) / kSteps;
+    const double c = std::pow(1 - std::pow(low, 2 / e1), e1 / 2);
+    for (const double side : {taper, -taper})
+      largest = std::max(largest, value(c * (1 + std::max(side * low, side * high)), high));
+  }
+  return largest;
+}
+
+/// Radius of a ball around the centre that holds the superquadric: the smallest, or of a tapered one a few
+/// thousandths larger [m].
 inline double bounding_radius_m(const Superquadric& sq) noexcept {
   const Vec3d& a = sq.semi_axes_m;
-  return std::sqrt(
-      largest_on_superellipse(largest_on_superellipse(a.x * a.x, a.y * a.y, sq.e2), a.z * a.z, sq.e1));
+  const double across = largest_on_superellipse(a.x * a.x, a.y * a.y, sq.e2);
+  if (sq.taper == 0) return std::sqrt(largest_on_superellipse(across, a.z * a.z, sq.e1));
+  return std::sqrt(largest_over_heights(
+      sq.taper, sq.e1, [&](double width, double w) { return width * width * across + w * w * a.z * a.z; }));
+}
+
+/// Volume [m^3]: 2 a1 a2 a3 e1 e2 B(e1/2 + 1, e1) B(e2/2, e2/2) (Jaklic, Leonardis, Solina 2000), times
+/// 1 + K^2 B(3 e1/2, e1 + 1) / B(e1/2, e1 + 1) of one with the taper K: cross-sections grow by (1 + K w)^2,
+/// w = z/a3, and the second factor is the mean of w^2.
+inline double volume_m3(const Superquadric& sq) noexcept {
+  const auto beta = [](double x, double y) { return std::tgamma(x) * std::tgamma(y) / std::tgamma(x + y); };
+  const double rigid_m3 = 2 * sq.semi_axes_m.x * sq.semi_axes_m.y * sq.semi_axes_m.z * sq.e1 * sq.e2 *
+                          beta(sq.e1 / 2 + 1, sq.e1) * beta(sq.e2 / 2, sq.e2 / 2);
+  if (sq.taper == 0) return rigid_m3;
+  return rigid_m3 * (1 + sq.taper * sq.taper * beta(1.5 * sq.e1, sq.e1 + 1) / beta(0.5 * sq.e1, sq.e1 + 1));
+}
+
+/// Half extents of a box around the superquadric: a1 (1 + |K|), a2 (1 + |K|), a3 [m].
+template <class T>
+Vec3<T> half_extents_m(const SuperquadricOf<T>& sq) noexcept {
+  using std::abs;
+  const T widest = T(1) + abs(sq.taper);
+  return {sq.semi_axes_m.x * widest, sq.semi_axes_m.y * widest, sq.semi_axes_m.z};
 }
 
 }  // namespace sqmap

@@ -19,6 +19,7 @@ struct FitOptions {
   /// One start and fewer points: several times faster, bounding all the same, a few percent larger. For
   /// comparing candidate cuts; the parts of an asset deserve the full fit.
   bool quick = false;
+  bool taper = false;  ///< tapered superquadrics too, as far as they are convex: within 0.9 max_taper(e1)
 
   /// kBadOption: exponents outside [kMinExponent, kMaxExponent] or out of order, max_iterations < 1,
   /// min_axis_ratio outside [1e-6, 1]. NaN is outside of everything.
@@ -69,8 +70,5 @@ inline constexpr double kBoundMargin = 1e-6;
 /// Point sets with a smaller half-extent count as one point: this many metres, or this share of the largest
 /// coordinate where that is more (a double resolves 1e-16 of it).
 inline constexpr double kMinHalfExtent = 1e-12;
-
-/// Volume of a superquadric [m^3]: 2 a1 a2 a3 e1 e2 B(e1/2 + 1, e1) B(e2/2, e2/2) (Jaklic et al. 2000).
-double volume_m3(const Superquadric& shape);
 
 }  // namespace sqmap::bake

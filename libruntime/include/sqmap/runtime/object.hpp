@@ -105,7 +105,7 @@ class Object {
   /// One point, object frame [m]. A point that is not finite gets the default Answer. Bounded time, no
   /// allocation.
   Answer query(const Vec3f& p_m, const QueryOptions& options = {}) const noexcept;
-  /// Many points. Same answers as one at a time. Needs up to 400 KB of stack, as do all questions about
+  /// Many points. Same answers as one at a time. Needs up to 420 KB of stack, as do all questions about
   /// bodies; one point needs 4 KB.
   void query(std::span<const Vec3f> points_m, const Answers& answers,
              const QueryOptions& options = {}) const noexcept;
@@ -150,9 +150,9 @@ class Object {
   ///                                                                      + [v > 0] (ceil(n / 64) + 8 v)
   ///                                   + 8 t + 36 m^2
   ///
-  /// m cells a side of the part's bounds, 0 without; s = 1 where any texel starts inside the mesh, else 0.
-  /// t tiles of at least 8 x 8 texels, at most 128 a part, each with four starts of layer 3.
-  /// The constant is below 200 bytes and the record below 256, both fixed by the build.
+  /// and 276 for a tapered part. m cells a side of the part's bounds, 0 without; s = 1 where any texel starts
+  /// inside the mesh, else 0. t tiles of at least 8 x 8 texels, at most 128 a part, each with four starts of
+  /// layer 3. The constant is below 200 bytes and the record at most 256, both fixed by the build.
   std::size_t resident_bytes() const noexcept;
 
  private:
