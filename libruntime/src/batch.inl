@@ -181,9 +181,13 @@ HWY_NOINLINE void Answerer::third_layer(const Chunk& chunk, bool is_whole) noexc
   for (std::uint32_t r = 0; r < entries_.range_count; ++r) {
     const EntryRange& range = entries_.ranges[r];
     const PartRecord& part = resident_.part(range.part);
-    if (layer_for(part, options_) != Layer::kThree) continue;
     const Looker looker(resident_, part, charts_.of(range.part), options_);
-    Walker(looker, wants_, entries_).refine(range.begin, range.end, asked_);
+    Walker walker(looker, wants_, entries_);
+    if (layer_for(part, options_) == Layer::kThree) {
+      walker.refine(range.begin, range.end, asked_);
+    } else {
+      walker.find_lost(range.begin, range.end);
+    }
   }
 }
 

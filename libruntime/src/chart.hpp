@@ -259,6 +259,18 @@ inline ChartAnswer Chart::look(const Vec3f& p, bool third, std::uint32_t level, 
       third_layer(p, stride, refined);
       if (refined.distance < answer.distance) answer = refined;
     }
+  } else if (answer.inside && !std::isfinite(answer.distance)) {
+    // Layer 2 of an inner point above which the ray meets nothing: it would feel no force. The search of
+    // layer 3 tells how far it is from the surface, from where the table of starts says.
+    const std::uint16_t named = resident_.start(part_, foot.row, foot.col, foot.depth_m);
+    Start other;
+    if (named != StartTable::kNone)
+      other = start_at(p, part_.starts.place(named >> 8U), part_.starts.place(named & 255U), stride);
+    if (std::isfinite(other.square)) {
+      answer.row = other.row;
+      answer.col = other.col;
+      third_layer(p, stride, answer);
+    }
   }
   if (edge > 0 && std::isfinite(answer.distance)) answer.offset = offset(answer.row, answer.col, level, edge);
   return answer;

@@ -21,7 +21,7 @@ enum EntryFlag : std::int32_t {
   kRefined = 32,  ///< surface and normal are layer 3's
   kWithin = 64,   ///< layer 2 cannot rule out that the surface is as near as Wants::reach
   kWanted = 128,  ///< its surface and normal will be asked for
-  kOther = 256,   ///< layer 3 may begin again at (other_row, other_col)
+  kOther = 256,   ///< layer 3 may begin again at (other_row, other_col); in layer 2, where it must begin
   kAnswer = 512,  ///< the nearest of its point: its distance is the answer
 };
 

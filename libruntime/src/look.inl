@@ -274,6 +274,14 @@ SQMAP_KERNEL Look Looker::look(const V3& p, M wanted, float reach) const noexcep
   // What the bounds prove may yet turn a point outside into one inside.
   const M inner = part_.bound_cells > 0 ? wanted : hn::And(inside, wanted);
   if (third_ && !none(inner)) look.start = pick(inner, start_of(foot.row, foot.col, foot.depth), look.start);
+  const M lost = hn::And(inner, hn::Eq(look.distance, all(std::numeric_limits<float>::infinity())));
+  if (!third_ && !none(lost)) {
+    const VI other = start_of(foot.row, foot.col, foot.depth);
+    const M named = hn::And(lost, as_float(hn::Ne(other, all_int(StartTable::kNone))));
+    look.flags = hn::Or(look.flags, flag(named, kOther));
+    look.foot_row = pick(named, start_row(other), look.foot_row);
+    look.foot_col = pick(named, start_col(other), look.foot_col);
+  }
   const V sure = pick(as_float(mixed), most(foot.depth, zero), all(part_.sphere_radius));
   look.certainty = least(gap, sure) / most(doubt, all(kLeastDoubt * part_.sphere_radius));
   return look;

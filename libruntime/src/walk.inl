@@ -66,6 +66,11 @@ class Walker {
     if (fans_.count > 0) fans();
     set_out_again(begin, end, aside);
   }
+  /// Finds, for layer 2, the surface near inner points above which it knows none: Chart::look.
+  HWY_NOINLINE void find_lost(std::uint32_t begin, std::uint32_t end) noexcept {
+    EntryList lost;
+    set_out_again(begin, end, lost);
+  }
 
  private:
   static constexpr int kFirstSteps = 2;
@@ -360,8 +365,9 @@ HWY_NOINLINE void Walker::set_out_again(std::uint32_t begin, std::uint32_t end, 
   const V far = all(Chart::far_from(part_, looker_.stride()));
   remote.count = 0;
   for (std::uint32_t i = begin; i < end; i += lane_count()) {
-    const VI other = hn::And(hn::LoadU(kDI, entries_.flags + i), all_int(kOther));
-    M is_far = hn::And(as_float(hn::Ne(other, hn::Zero(kDI))), hn::FirstN(kD, end - i));
+    constexpr std::int32_t kBoth = kOther | kInside;
+    const VI flags = hn::And(hn::LoadU(kDI, entries_.flags + i), all_int(kBoth));
+    M is_far = hn::And(as_float(hn::Eq(flags, all_int(kBoth))), hn::FirstN(kD, end - i));
     is_far = hn::And(is_far, hn::Gt(hn::LoadU(kD, entries_.distance + i), far));
     remote.append(hn::Iota(kDI, static_cast<std::int32_t>(i)), is_far);
   }

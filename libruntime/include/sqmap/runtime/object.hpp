@@ -44,8 +44,8 @@ inline constexpr std::uint32_t kNowhere = 0xFFFFFFFF;
 /// What is known about one point. Object frame, metres.
 struct Answer {
   /// Distance to the surface, negative inside. NaN where nothing is known: outside every superquadric (the
-  /// point is then outside the object, farther than `part` can tell), in layer 1, and in layer 2 inside the
-  /// mesh where a ray from beside a seam meets no surface.
+  /// point is then outside the object, farther than `part` can tell), in layer 1, and in layer 2 at few
+  /// places inside the mesh, where neither the ray from above nor a search beside it meets a surface.
   float signed_distance_m = std::numeric_limits<float>::quiet_NaN();
   Vec3f normal;     ///< outward unit normal of the object near the point; zero where unknown
   Vec3f surface_m;  ///< the point of the surface that signed_distance_m speaks of; zero where unknown
