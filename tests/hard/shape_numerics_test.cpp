@@ -68,6 +68,46 @@ TYPED_TEST(Scalar, RadialFunctionHoldsToAFewUnitsInTheLastPlace) {
   EXPECT_LT(worst, 4 * TestFixture::kEpsilon);
 }
 
+TYPED_TEST(Scalar, TaperedRadialFunctionHoldsToAFewUnitsInTheLastPlace) {
+  using T = TypeParam;
+  std::mt19937_64 rng(65);
+  std::uniform_real_distribution<double> unit(-1, 1);
+  double worst = 0, worst_on_surface = 0;
+  int inside = 0, outside = 0;
+  for (const double e1 : {0.1, 0.3, 1.0, 1.9})
+    for (const double e2 : {0.1, 2.0})
+      for (const Vec3d& ratio : kRatios)
+        for (const double share : {-1.0, 0.6}) {
+          auto sq = narrowed<T>(ratio, e1, e2);
+          sq.taper = static_cast<T>(share * max_taper(e1));
+          for (int i = 0; i < 4; ++i) {
+            const double reach = i == 3 ? 1e6 : 1.5;
+            Vec3<T> p{static_cast<T>(reach * ratio.x * unit(rng)),
+                      static_cast<T>(reach * ratio.y * unit(rng)),
+                      static_cast<T>(reach * ratio.z * unit(rng))};
+            if (i == 1) p[static_cast<int>(rng() % 3)] = 0;
+            if (i == 2) p[0] = p[1] = T(0);
+            const Real exact = reference::radial(sq, p);
+            const T beta = inside_outside_radial(sq, p);
+            ASSERT_TRUE(std::isfinite(beta));
+            (exact < 1 ? inside : outside)++;
+            worst = std::max(worst, static_cast<double>(abs(Real(beta) - exact) / exact));
+            const double eta = std::numbers::pi / 2 * unit(rng), omega = std::numbers::pi * unit(rng);
+            const auto on = surface_point(
+                sq, superellipse_point(static_cast<T>(std::cos(eta)), static_cast<T>(std::sin(eta)), sq.e1),
+                superellipse_point(static_cast<T>(std::cos(omega)), static_cast<T>(std::sin(omega)), sq.e2));
+            worst_on_surface =
+                std::max(worst_on_surface, static_cast<double>(abs(reference::radial(sq, on) - 1)));
+          }
+        }
+  EXPECT_GT(inside, 50);
+  EXPECT_GT(outside, 50);
+  this->RecordProperty("worst_units_in_the_last_place", std::to_string(worst / TestFixture::kEpsilon));
+  this->RecordProperty("surface_points", std::to_string(worst_on_surface / TestFixture::kEpsilon));
+  EXPECT_LT(worst, 4 * TestFixture::kEpsilon);
+  EXPECT_LT(worst_on_surface, 4 * TestFixture::kEpsilon);
+}
+
 TYPED_TEST(Scalar, RadialFunctionStaysFiniteAtTheEndsOfTheNumbers) {
   using T = TypeParam;
   using Limits = std::numeric_limits<T>;

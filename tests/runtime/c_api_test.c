@@ -81,6 +81,34 @@ static void refuses_broken_descriptions(void) {
   sqmap_object_destroy(NULL);
 }
 
+// Narrower by 0.7 at the lower point, wider by 1.3 at the upper one: the ball would hold the first alone.
+static void tapers(void) {
+  const float points[6] = {0.38F, 0, -0.25F, 0.5F, 0, 0.25F};
+  uint8_t inside[2] = {9, 9};
+  sqmap_part_desc part = ball_part();
+  part.taper = 0.6;
+  part.sphere_m[3] = 0.8;
+  sqmap_asset_desc asset = {sizeof asset, 1, 0.8, {0, 0, 0, 0.8}, &part};
+  sqmap_object* object = NULL;
+  SQMAP_CHECK(sqmap_object_build(&asset, &object, NULL) == SQMAP_OK);
+  const double pose[12] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
+  sqmap_instance instance;
+  SQMAP_CHECK(sqmap_instance_place_matrix(object, pose, &instance, NULL) == SQMAP_OK);
+  sqmap_query_options options = SQMAP_QUERY_OPTIONS_INIT;
+  options.layer = SQMAP_LAYER_1;
+  sqmap_answers answers = SQMAP_ANSWERS_INIT;
+  answers.inside = inside;
+  SQMAP_CHECK(sqmap_query(&instance, points, 2, &options, &answers) == SQMAP_OK);
+  SQMAP_CHECK(inside[0] == 0 && inside[1] == 1);
+  sqmap_object_destroy(object);
+
+  sqmap_error error = SQMAP_ERROR_INIT;
+  part.taper = 0.71;  // not convex
+  object = NULL;
+  SQMAP_CHECK(sqmap_object_build(&asset, &object, &error) == SQMAP_INVALID_ASSET && object == NULL);
+  SQMAP_CHECK(strstr(error.finding, "taper") != NULL);
+}
+
 static void tells_about_the_object(const sqmap_object* object) {
   sqmap_object_info info = SQMAP_OBJECT_INFO_INIT;
   SQMAP_CHECK(sqmap_object_get_info(object, &info) == SQMAP_OK);
@@ -374,6 +402,7 @@ int main(int argc, char** argv) {
   SQMAP_CHECK(strcmp(sqmap_status_text(SQMAP_OK), "done") == 0);
   SQMAP_CHECK(strcmp(sqmap_status_text(-1), "unknown status") == 0);
   refuses_broken_descriptions();
+  tapers();
   keeps_a_rate();
   all_about(made_ball());
 #ifdef SQMAP_TEST_LOAD
