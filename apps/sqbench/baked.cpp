@@ -4,7 +4,11 @@
 #include <stdexcept>
 #include <utility>
 
+#include <nlohmann/json.hpp>
+
 #include "sqmap/io/bundle.hpp"
+
+#include "timing.hpp"
 
 namespace sqmap::bench {
 
@@ -36,6 +40,33 @@ Model baked_model(const std::string& name, const bake::Mesh& mesh, const bake::B
 
 Model baked_again(const Model& model, const bake::BakeOptions& options) {
   return baked_model(model.name, model.mesh, options);
+}
+
+namespace {
+
+/// Those that the bundle was baked to, as it records them.
+bake::BakeOptions limits_of(const Provenance& provenance) {
+  bake::BakeOptions options;
+  const auto recorded = nlohmann::json::parse(provenance.options_json, nullptr, false);
+  if (!recorded.is_object()) return options;
+  options.max_error_percent = recorded.value("max_error_percent", options.max_error_percent);
+  options.max_error_m = recorded.value("max_error_m", options.max_error_m);
+  options.max_parts = recorded.value("max_parts", options.max_parts);
+  options.max_bytes = recorded.value("max_bytes", options.max_bytes);
+  return options;
+}
+
+}  // namespace
+
+const Model& Model::tapered() const {
+  if (!with_tapers) {
+    bake::BakeOptions options = limits_of(asset.provenance);
+    options.fit.taper = true;
+    const double start_s = wall_s();
+    with_tapers = std::make_shared<const Model>(baked_again(*this, options));
+    with_tapers_s = wall_s() - start_s;
+  }
+  return *with_tapers;
 }
 
 }  // namespace sqmap::bench

@@ -25,6 +25,11 @@ Entrant sqmap_entrant(int layer, unsigned level, unsigned density = 0) {
           [=](const Model& model) { return make_sqmap(model, layer, level); }, density};
 }
 
+Entrant tapered_entrant(int layer) {
+  const std::string id = fmt::format("sqmap-tapered-layer{}", layer);
+  return {id, id, [=](const Model& model) { return make_sqmap(model.tapered(), layer, 0); }, 0};
+}
+
 Entrant grid_entrant(GridCode code, unsigned resolution) {
   const char* kind = code == GridCode::kFloatScalar || code == GridCode::kFloatSimd ? "float" : "int16";
   const char* how = code == GridCode::kFloatScalar       ? "scalar"
@@ -78,7 +83,8 @@ const Entrant kCgal{"cgal-closest", "cgal-closest", make_cgal, 0};
 }  // namespace
 
 std::vector<Entrant> frame_entrants(const Model& model, bool smoke) {
-  std::vector<Entrant> entrants{sqmap_entrant(1, 0), sqmap_entrant(2, 0), sqmap_entrant(3, 0)};
+  std::vector<Entrant> entrants{sqmap_entrant(1, 0), sqmap_entrant(2, 0), sqmap_entrant(3, 0),
+                                tapered_entrant(2), tapered_entrant(3)};
   for (const unsigned resolution : {64U, 128U, 256U})
     for (const GridCode code :
          {GridCode::kInt16Simd, GridCode::kInt16SimdCulled, GridCode::kFloatSimd, GridCode::kFloatScalar})
@@ -104,6 +110,7 @@ std::vector<Entrant> accuracy_entrants(const Model& model, bool smoke) {
   for (const int layer : {2, 3})
     for (unsigned level = 0; level < levels; ++level)
       entrants.push_back(sqmap_entrant(layer, level, rows_of(model.asset, level)));
+  for (const int layer : {2, 3}) entrants.push_back(tapered_entrant(layer));
   for (const unsigned resolution : {16U, 32U, 64U, 128U, 256U}) {
     if (smoke && resolution > 128) continue;
     entrants.push_back(grid_entrant(GridCode::kFloatScalar, resolution));

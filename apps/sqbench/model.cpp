@@ -40,7 +40,7 @@ const std::vector<double>& Model::field_seconds(unsigned resolution) const {
 }
 
 double Model::shared_s() const {
-  double sum_s = 0;
+  double sum_s = with_tapers_s;
   for (const auto& [resolution, field] : fields)
     sum_s += std::accumulate(field->seconds.begin(), field->seconds.end(), 0.0);
   for (const auto& [count, kept] : hulls)

@@ -37,13 +37,18 @@ struct Model {
   /// How long that takes; computed again until it is timed often enough.
   const std::vector<double>& field_seconds(unsigned resolution) const;
 
+  /// The same object, baked to the same limits with FitOptions::taper, when first asked for.
+  const Model& tapered() const;
+
   /// Sets low_m and high_m from the mesh.
   void find_box();
 
   mutable std::map<unsigned, std::shared_ptr<Field>> fields;
   /// Convex hulls, by the least number of them: kept, as they take up to minutes.
   mutable std::map<std::size_t, Hulls> hulls;
-  /// Spent so far on fields and hulls.
+  mutable std::shared_ptr<const Model> with_tapers;
+  mutable double with_tapers_s{};  ///< its bake took
+  /// Spent so far on fields, hulls and the bake of tapered().
   double shared_s() const;
 };
 
