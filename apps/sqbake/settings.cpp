@@ -179,7 +179,7 @@ constexpr std::array<Setting, 12> kSettings{{
      "Also store bounds of the surface, which tell what is surely inside or outside;\nneeds a closed mesh",
      default_conservative, apply_conservative},
     {"taper", "on|off",
-     "Taper superquadrics where that saves bytes at the target error; takes about\ntwice as long to fit",
+     "Taper superquadrics where that saves memory at the target error; a bake takes\nabout 1.5 times as long",
      default_taper, apply_taper},
     {"timeout", "TIME", "End the bake of a mesh after this time: 90s, 5m, 2h or none", default_timeout,
      apply_timeout},
