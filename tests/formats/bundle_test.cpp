@@ -206,31 +206,17 @@ TEST(Bundle, LimitsAreKept) {
   EXPECT_TRUE(io::decode(bytes, {bytes.size(), 4096}));
 }
 
-// The golden file was written by the first release of format 1.0 and never changes.
-TEST(Bundle, GoldenBundleOfVersion1_0Loads) {
-  std::ifstream file(SQMAP_GOLDEN_DIR "/v1_0.h5", std::ios::binary);
-  const Bytes bytes{std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
-  const auto decoded = io::decode(bytes);
-  ASSERT_TRUE(decoded) << decoded.error().finding;
-  EXPECT_TRUE(identical(decoded.value(), rich_asset()));
-}
-
-// Written when version 1.1 was made; never changes.
-TEST(Bundle, GoldenBundleOfVersion1_1Loads) {
-  std::ifstream file(SQMAP_GOLDEN_DIR "/v1_1.h5", std::ios::binary);
-  const Bytes bytes{std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
-  const auto decoded = io::decode(bytes);
-  ASSERT_TRUE(decoded) << decoded.error().finding;
-  EXPECT_TRUE(identical(decoded.value(), bounded_asset()));
-}
-
-// Written when version 1.2 was made; never changes.
-TEST(Bundle, GoldenBundleOfVersion1_2Loads) {
-  std::ifstream file(SQMAP_GOLDEN_DIR "/v1_2.h5", std::ios::binary);
-  const Bytes bytes{std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
-  const auto decoded = io::decode(bytes);
-  ASSERT_TRUE(decoded) << decoded.error().finding;
-  EXPECT_TRUE(identical(decoded.value(), tapered_asset()));
+// Each written when its version was made; they never change.
+TEST(Bundle, GoldenBundlesOfAllVersionsLoad) {
+  for (const auto& [name, asset] :
+       {std::pair{"v1_0.h5", rich_asset()}, {"v1_1.h5", bounded_asset()}, {"v1_2.h5", tapered_asset()}}) {
+    SCOPED_TRACE(name);
+    std::ifstream file(std::string(SQMAP_GOLDEN_DIR "/") + name, std::ios::binary);
+    const Bytes bytes{std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+    const auto decoded = io::decode(bytes);
+    ASSERT_TRUE(decoded) << decoded.error().finding;
+    EXPECT_TRUE(identical(decoded.value(), asset));
+  }
 }
 
 // Two rows by four columns, worked by hand from FORMAT.md section 6.1.
