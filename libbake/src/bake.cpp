@@ -210,6 +210,7 @@ std::vector<std::uint16_t> label_input_faces(const std::vector<std::uint16_t>& o
 struct Drawn {
   double depth_in_aims;  ///< mean error of depth near the surface over what it may be
   bool by_budget;        ///< the byte budget decided
+  std::size_t bytes;     ///< of the object in memory
 };
 
 /// The maps that the target asks for. What they lose beside seams, where one chart ends and the next has not
@@ -221,6 +222,7 @@ Result<Drawn> draw_maps(Asset& asset, MapDrawer& drawer, std::size_t most_shapes
   std::vector<Part> best;
   double depth_in_aims = 0, sides_in_aims = 0;
   bool by_budget = false;
+  std::size_t bytes = 0;
   MapTarget asked = target;
   double share = 1;  // of the target before
   for (int round = 0; round < kMapRounds; ++round) {
@@ -242,6 +244,7 @@ Result<Drawn> draw_maps(Asset& asset, MapDrawer& drawer, std::size_t most_shapes
     sides_in_aims = sides;
     best = asset.parts;
     by_budget = budget_decided;
+    bytes = object.value().resident_bytes();
     const double worse = std::max(depth, sides);
     if (by_budget || worse <= 1) break;
     share =
@@ -250,7 +253,7 @@ Result<Drawn> draw_maps(Asset& asset, MapDrawer& drawer, std::size_t most_shapes
   }
   asset.parts = std::move(best);
   asset.sphere = enclosing_sphere(asset.parts);
-  return Drawn{depth_in_aims, by_budget};
+  return Drawn{depth_in_aims, by_budget, bytes};
 }
 
 /// The asset with the superquadrics that its partition was judged by. The full fits are smaller, but one in
@@ -278,17 +281,6 @@ std::vector<std::vector<PlacedShape>> shapes_of(const Asset& asset, const std::v
   return shapes;
 }
 
-/// Of the maps in memory, but for what depends on the number of parts alone.
-std::size_t map_bytes(const Asset& asset) {
-  std::size_t bits = 0;
-  for (const Part& part : asset.parts) {
-    const DistanceMap& map = part.map;
-    bits += map.code.size() * (map.bits + (map.start_inside.empty() ? 0 : 1)) + 48 * map.crossings.size() +
-            64 * map.vertex_samples.size();
-  }
-  return bits / 8;
-}
-
 /// The maps of the parts' first shapes; or with tapers, where those meet the target as well in fewer bytes.
 Result<Drawn> draw_smallest(Asset& asset, const std::vector<Piece>& pieces,
                             const std::vector<double>& areas_m2, const MeshQueries& queries,
@@ -306,7 +298,7 @@ Result<Drawn> draw_smallest(Asset& asset, const std::vector<Piece>& pieces,
   const bool meets = tapered.depth_in_aims <= std::max(rigid.depth_in_aims, 1.0);
   // Where the budget decides, bytes are the same and errors differ.
   const bool gains = rigid.by_budget ? tapered.depth_in_aims < rigid.depth_in_aims
-                                     : !tapered.by_budget && map_bytes(other) < map_bytes(asset);
+                                     : !tapered.by_budget && tapered.bytes < rigid.bytes;
   if (!meets || !gains) return drawn;
   asset = std::move(other);
   return redrawn;
