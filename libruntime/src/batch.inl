@@ -260,6 +260,8 @@ HWY_NOINLINE void Answerer::mark_wanted(bool is_whole, Findings& findings) noexc
 HWY_NOINLINE void Answerer::place(const EntryRange& range) noexcept {
   const PartRecord& part = resident_.part(range.part);
   const Looker looker(resident_, part, charts_.of(range.part), options_);
+  const float blur = part.blur(looker.stride());
+  const bool third = layer_for(part, options_) == Layer::kThree;
   const auto loaded = [](float(&values)[3][Entries::kLength], std::uint32_t i)
                           HWY_ATTR { return load3(values[0], values[1], values[2], i); };
   const auto store = [](const V3& v, float(&values)[3][Entries::kLength], std::uint32_t i) HWY_ATTR {
@@ -276,13 +278,23 @@ HWY_NOINLINE void Answerer::place(const EntryRange& range) noexcept {
     if (none(wanted)) continue;
     const M refined = has(kRefined);
     V3 surface = loaded(entries_.surface, i), normal = loaded(entries_.normal, i);
+    // Those whose surface is the nearest known, not that along the superquadric's normal.
+    const M nearest = hn::And(wanted, third ? hn::Or(refined, hn::Not(has(kPatch))) : refined);
+    const bool needs_surface = wants_.surface || !none(nearest);
     const M rough = hn::AndNot(refined, wanted);
+    if (wants_.normal) normal = direction3(normal);
     if (!none(rough)) {
       const V row = hn::LoadU(kD, entries_.row + i), col = hn::LoadU(kD, entries_.col + i);
-      if (wants_.surface)
+      if (needs_surface)
         surface = pick(refined, surface, looker.surface_at(row, col, hn::LoadU(kD, entries_.crossing + i)));
       if (wants_.normal)
         normal = pick(refined, normal, looker.normal_at(rough, row, col, has(kLeaving), has(kPatch)));
+    }
+    if (wants_.normal && !none(nearest)) {
+      const V3 p = load3(entries_.x, entries_.y, entries_.z, i);
+      const V3 out = pick(has(kInside), surface - p, p - surface);
+      const M on_rim = hn::AndNot(has(kFaces), refined);
+      normal = pick(nearest, outward3(out, normal, blur, on_rim), normal);
     }
     if (wants_.surface)
       store(rotated(part.object_from_part, surface) + all(part.translation), entries_.surface, i);
@@ -305,7 +317,7 @@ HWY_NOINLINE void Answerer::hand_over(Findings& findings) noexcept {
 
 // What Object promises of the stack; the rest is a few vectors that did not fit registers.
 static_assert(sizeof(Answerer) + sizeof(Walker) + sizeof(Chunk) + sizeof(Findings) + sizeof(EntryList) <=
-              std::size_t{400} * 1024);
+              std::size_t{416} * 1024);
 
 /// Default answers.
 inline void clear(const Answers& answers, std::size_t begin, std::size_t count) noexcept {

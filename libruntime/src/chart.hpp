@@ -27,12 +27,13 @@ struct ChartAnswer {
   float distance =
       std::numeric_limits<float>::infinity();  ///< to the represented surface; infinite: not eligible
   Vec3f surface;                               ///< nearest point found on it
-  Vec3f normal;                                ///< outward unit normal there
+  Vec3f normal;                                ///< outward unit normal: outward_at()
   float row{}, col{};                          ///< where on the map
   bool has_point{};                            ///< layer 2: the distance is to a crossing that is on no patch
   bool leaving{};                              ///< layer 2: the ray leaves the material there
   bool bounds_patch{};                         ///< layer 2: the cell of the foot bounds a surface patch
   float offset{};      ///< delta of QueryOptions::edge_length_m; 0 on flat and hollow surface
+  bool refined{};      ///< by the search of layer 3
   bool faces_patch{};  ///< layer 3: the nearest point lies within the represented surface, not on its rim
 };
 
@@ -47,13 +48,10 @@ inline constexpr float kBackStep = 0.35F;  ///< what is kept of a step that lead
 inline constexpr float kLeastAngle =
     1e-6F;  ///< squared sine between rows and columns, below which one is a pole
 /// Cells: shorter steps end the search.
-inline constexpr float kLeastCellStep = 0.03F;
+inline constexpr float kLeastCellStep = 0.05F;
 /// Nor is a step worth its while that brings the point nearer by less than this share of a depth step, as its
 /// linear model foretells: the map knows no better.
-inline constexpr float kLeastGain = 0.03F;
-/// The normal of a patch is replaced by the direction to its nearest point where the cosine between them is
-/// less than kBack, unless the point is so near, as a share of far_from(), that its side is in doubt.
-inline constexpr float kBack = -0.5F, kNearShare = 0.1F;
+inline constexpr float kLeastGain = 0.06F;
 /// Rings of eight cells, 2^ring cells away, around a foot whose cell bounds no patch.
 inline constexpr int kRings = 4;
 
@@ -62,6 +60,20 @@ inline constexpr int kRings = 4;
 inline Vec3f direction_of(const Vec3f& v) noexcept {
   const float most = greater(greater(std::abs(v.x), std::abs(v.y)), std::abs(v.z));
   return most > 0 ? normalized(Vec3f{v.x / most, v.y / most, v.z / most}) : Vec3f{};
+}
+
+/// The direction in which the distance grows at a point that `out` joins to the nearest place of the surface,
+/// away from the object. Near the surface, where `out` says little, that is the surface's normal there; in
+/// between
+///
+///     n ~ out + blur normal,
+///
+/// so that facets which meet in an edge turn a force no faster than the point moves around it. On the rim of
+/// a patch, beyond which the surface goes on, the normal knows better too.
+inline Vec3f outward_at(const Vec3f& out, const Vec3f& normal, float blur, bool on_rim) noexcept {
+  // A normal that looks the other way is that of a patch folded over itself; nearby, the side is in doubt.
+  const bool holds = dot(out, normal) < 0 ? !(dot(out, out) > 4.0F * (blur * blur)) : on_rim;
+  return holds ? normal : normalized(out + blur * normal);
 }
 
 /// By how much a tapered part is narrower than its box at z, |z| <= a3; 1 of a rigid one.
@@ -117,11 +129,6 @@ class Chart {
   ChartAnswer look(const Vec3f& p, bool third, std::uint32_t level, float edge) const noexcept;
   /// The represented surface at a place of level 0. False: its cell bounds no patch.
   bool patch_point(float row, float col, Vec3f& point) const noexcept;
-  /// Beyond this distance, about a cell, a walk may have ended on the wrong surface.
-  static float far_from(const PartRecord& part, std::uint32_t stride) noexcept {
-    const Vec3f& a = part.semi_axes;
-    return lesser(lesser(a.x, a.y), a.z) * (5 * static_cast<float>(stride) / static_cast<float>(part.rows));
-  }
   /// delta of QueryOptions::edge_length_m at a place of the map.
   float offset(float row, float col, std::uint32_t level, float edge) const noexcept;
 
@@ -154,11 +161,11 @@ class Chart {
   /// In the nearest of the eight cells of the first ring around (row, col) that has one with a patch.
   Start start_beside(const Vec3f& p, float row, float col, std::uint32_t stride) const noexcept;
   Patch patch_at(const Cell& cell, float row, float col, std::uint32_t stride) const noexcept;
-  /// Outward unit normal of the represented surface at (row, col) of the cell.
-  Vec3f patch_normal(const Cell& cell, float row, float col, std::uint32_t stride) const noexcept {
+  /// Outwards across the represented surface at (row, col) of the cell; of no certain length.
+  Vec3f patch_across(const Cell& cell, float row, float col, std::uint32_t stride) const noexcept {
     const float last = static_cast<float>(part_.rows - 1);
     const Patch patch = patch_at(cell, lesser(greater(row, kBesidePole), last - kBesidePole), col, stride);
-    return direction_of(cross(patch.col, patch.row));
+    return cross(patch.col, patch.row);
   }
   Vec3f place(float row, float col, float depth) const noexcept {
     const SurfaceSample<float> r = table_.sample(row, col);
@@ -168,10 +175,17 @@ class Chart {
   struct Step {
     float row, col;  ///< [cells of level 0]
     float gain;      ///< of the squared distance, by the linear model
+    Vec3f way;       ///< of the place, by the linear model
   };
   /// Gauss-Newton from (row, col), towards the point of the patch where `error` = p - patch.point is normal
   /// to it.
   Step step_towards(const Patch& patch, const Vec3f& error, std::uint32_t stride) const noexcept;
+  /// Whether the step is not worth its while; square: of the distance so far.
+  bool is_over(const Step& step, float square) const noexcept {
+    const float least_gain = kLeastGain * part_.depth_step;
+    return std::abs(step.row) + std::abs(step.col) < kLeastCellStep ||
+           step.gain * step.gain < least_gain * least_gain * square;
+  }
   /// From (answer.row, answer.col), whose cell bounds a patch.
   void third_layer(const Vec3f& p, std::uint32_t stride, ChartAnswer& answer) const noexcept;
   bool vertex_fan(const Vec3f& p, const Cell& cell, ChartAnswer& answer) const noexcept;
@@ -253,7 +267,7 @@ inline ChartAnswer Chart::look(const Vec3f& p, bool third, std::uint32_t level, 
       // A crossing that is on no patch stands where it is nearer.
       if (!answer.has_point || refined.distance < answer.distance) answer = refined;
     }
-    if (std::isfinite(other.square) && answer.distance > far_from(part_, stride)) {
+    if (std::isfinite(other.square) && answer.distance > part_.far_from(stride)) {
       refined.row = other.row;
       refined.col = other.col;
       third_layer(p, stride, refined);
@@ -271,6 +285,12 @@ inline ChartAnswer Chart::look(const Vec3f& p, bool third, std::uint32_t level, 
       answer.col = other.col;
       third_layer(p, stride, answer);
     }
+  }
+  if (answer.refined) answer.normal = direction_of(answer.normal);
+  if (answer.refined || (third && !answer.bounds_patch)) {
+    const Vec3f out = answer.inside ? answer.surface - p : p - answer.surface;
+    const bool on_rim = answer.refined && !answer.faces_patch;
+    answer.normal = outward_at(out, answer.normal, part_.blur(stride), on_rim);
   }
   if (edge > 0 && std::isfinite(answer.distance)) answer.offset = offset(answer.row, answer.col, level, edge);
   return answer;
@@ -377,7 +397,8 @@ inline ChartAnswer Chart::second_layer(const Vec3f& p, const Foot<float>& foot,
   }
   answer.distance = gap;
   answer.surface = place(foot.row, foot.col, crossing);
-  answer.normal = (answer.leaving ? -1.0F : 1.0F) * patch_normal(cell, foot.row, foot.col, stride);
+  answer.normal =
+      (answer.leaving ? -1.0F : 1.0F) * direction_of(patch_across(cell, foot.row, foot.col, stride));
   return answer;
 }
 
@@ -434,8 +455,9 @@ inline Chart::Step Chart::step_towards(const Patch& patch, const Vec3f& error,
   const float slimness =
       std::sqrt(a / greater(greater(c, kLeastAngle * a), std::numeric_limits<float>::min()));
   const float most_col = lesser(static_cast<float>(part_.cols) * 0.125F, most_row * greater(slimness, 1.0F));
-  Step step{lesser(greater(d_row, -most_row), most_row), lesser(greater(d_col, -most_col), most_col), 0};
+  Step step{lesser(greater(d_row, -most_row), most_row), lesser(greater(d_col, -most_col), most_col), 0, {}};
   step.gain = f * step.row + g * step.col;
+  step.way = step.row * patch.row + step.col * patch.col;
   return step;
 }
 
@@ -450,11 +472,9 @@ inline void Chart::third_layer(const Vec3f& p, std::uint32_t stride, ChartAnswer
   float square = dot(error, error);
   bool on_rim = false;
   Step ahead = step_towards(patch, error, stride);
-  const float least_gain = kLeastGain * part_.depth_step, least_square = least_gain * least_gain;
   // Always from the nearest place so far; a step that leads away from it is taken again, shorter.
   for (int step = 0; step < kThirdLayerSteps; ++step) {
-    if (std::abs(ahead.row) + std::abs(ahead.col) < kLeastCellStep) break;
-    if (ahead.gain * ahead.gain < least_square * square) break;
+    if (is_over(ahead, square)) break;
     float next_row = lesser(greater(row + ahead.row, 0.0F), last_row);
     float next_col = wrapped(col + ahead.col);
     Cell next = cell_at(next_row, next_col, stride);
@@ -492,6 +512,16 @@ inline void Chart::third_layer(const Vec3f& p, std::uint32_t stride, ChartAnswer
       ahead.row *= kBackStep;
       ahead.col *= kBackStep;
       ahead.gain *= kBackStep;
+      ahead.way = kBackStep * ahead.way;
+    }
+  }
+  // What is left of the way needs no look at the map.
+  if (!on_rim && is_over(ahead, square)) {
+    const Vec3f further = point + ahead.way;
+    const Vec3f rest = p - further;
+    if (dot(rest, rest) < square) {
+      square = dot(rest, rest);
+      point = further;
     }
   }
   answer.distance = std::sqrt(square);
@@ -499,12 +529,8 @@ inline void Chart::third_layer(const Vec3f& p, std::uint32_t stride, ChartAnswer
   answer.faces_patch = !on_rim;
   answer.row = row;
   answer.col = col;
-  answer.normal = patch_normal(cell, row, col, stride);
-  // A patch that is folded over itself shows its back.
-  const Vec3f out = answer.inside ? point - p : p - point;
-  if (dot(out, answer.normal) < kBack * answer.distance &&
-      answer.distance > kNearShare * far_from(part_, stride))
-    answer.normal = direction_of(out);
+  answer.normal = patch_across(cell, row, col, stride);
+  answer.refined = true;
   if (stride == 1) vertex_fan(p, cell, answer);
 }
 
@@ -530,7 +556,7 @@ inline bool Chart::vertex_fan(const Vec3f& p, const Cell& cell, ChartAnswer& ans
     if (square < best_square) {
       best_square = square;
       answer.surface = nearest;
-      answer.normal = direction_of(cross(b - a, apex - a));
+      answer.normal = cross(b - a, apex - a);
     }
   }
   answer.distance = std::sqrt(best_square);

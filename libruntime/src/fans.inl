@@ -98,7 +98,7 @@ HWY_NOINLINE void Walker::fans() noexcept {
       normal = pick(nearer, cross3(b - a, apex - a), normal);
     }
     write(hn::LoadU(kDI, fans_.entry + i), lanes, hn::LoadU(kD, fans_.row + i), hn::LoadU(kD, fans_.col + i),
-          hn::LoadU(kD, fans_.on_rim + i), hn::Sqrt(best), surface, direction3(normal));
+          hn::LoadU(kD, fans_.on_rim + i), hn::Sqrt(best), surface, normal);
   }
   fans_.count = 0;
 }

@@ -66,6 +66,13 @@ HWY_INLINE V3 direction3(const V3& v) {
   const V divisor = pick(hn::Gt(longest, hn::Zero(kD)), longest, all(1.0F));
   return normalized3({v.x / divisor, v.y / divisor, v.z / divisor});
 }
+/// outward_at() of chart.hpp.
+HWY_INLINE V3 outward3(const V3& out, const V3& normal, float blur, M on_rim) {
+  const M back = hn::Lt(dot3(out, normal), hn::Zero(kD)),
+          far = hn::Gt(dot3(out, out), all(4.0F * (blur * blur)));
+  const M holds = hn::Or(hn::AndNot(far, back), hn::AndNot(back, on_rim));
+  return pick(holds, normal, normalized3(out + all(blur) * normal));
+}
 HWY_INLINE V3 rotated(const Rotation<float>& r, const V3& v) {
   return {dot3(all(r.row[0]), v), dot3(all(r.row[1]), v), dot3(all(r.row[2]), v)};
 }

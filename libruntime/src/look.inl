@@ -47,7 +47,7 @@ class Looker {
   HWY_INLINE V3 normal_at(M lanes, V row, V col, M leaving, M on_patch) const noexcept {
     VCell cell = cell_at(row, col);
     read(cell);
-    V3 normal = patch_normal(cell, row, col);
+    V3 normal = direction3(patch_across(cell, row, col));
     if (!none(hn::AndNot(on_patch, lanes)))
       normal = pick(on_patch, normal, sample_at(tables_, row, col).normal);
     return pick(leaving, all(-1.0F), all(1.0F)) * normal;
@@ -125,9 +125,9 @@ class Looker {
     return {r.point - depth * r.normal, r.point_row - depth_row * r.normal - depth * r.normal_row,
             r.point_col - depth_col * r.normal - depth * r.normal_col};
   }
-  SQMAP_KERNEL V3 patch_normal(const VCell& cell, V row, V col) const noexcept {
+  SQMAP_KERNEL V3 patch_across(const VCell& cell, V row, V col) const noexcept {
     const VPatch patch = patch_at(cell, limited(row, all(kBesidePole), all(last_row_ - kBesidePole)), col);
-    return direction3(cross3(patch.col, patch.row));
+    return cross3(patch.col, patch.row);
   }
   /// Chart::offset.
   SQMAP_KERNEL V offset(V row, V col, float edge) const noexcept;

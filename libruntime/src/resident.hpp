@@ -110,6 +110,13 @@ struct PartRecord {
   std::uint32_t stride_at(std::uint32_t level) const noexcept {
     return 1U << (level < level_count ? level : level_count - 1U);
   }
+  /// Beyond this distance, about a cell of the map, a search may have ended on the wrong surface.
+  float far_from(std::uint32_t stride) const noexcept {
+    const float least_axis = std::min(std::min(semi_axes.x, semi_axes.y), semi_axes.z);
+    return least_axis * (5 * static_cast<float>(stride) / static_cast<float>(rows));
+  }
+  /// Of outward_at(): so near the surface the direction to the nearest place of a map says little.
+  float blur(std::uint32_t stride) const noexcept { return 0.05F * far_from(stride); }
   double texels_at_level(std::uint32_t level) const noexcept {
     const std::uint32_t stride = stride_at(level);
     const std::uint32_t row_steps = (rows - 1) / stride, col_steps = cols / stride;

@@ -9,14 +9,15 @@ struct Walk {
   V row, col, square, d_row, d_col, gain;  // gain: Chart::Step
   VI cell_row, cell_col;
   V3 point, normal;  // normal: unnormalised
+  V3 way;            // Chart::Step
   V on_rim;          // 1 or 0
 };
-constexpr int kWalkFields = 16;  // those of float
+constexpr int kWalkFields = 19;  // those of float
 HWY_INLINE void fields_of(Walk& walk, V* (&fields)[kWalkFields]) {
-  V* const all_fields[] = {&walk.p.x,      &walk.p.y,      &walk.p.z,     &walk.row,
-                           &walk.col,      &walk.square,   &walk.d_row,   &walk.d_col,
-                           &walk.point.x,  &walk.point.y,  &walk.point.z, &walk.normal.x,
-                           &walk.normal.y, &walk.normal.z, &walk.on_rim,  &walk.gain};
+  V* const all_fields[] = {&walk.p.x,     &walk.p.y,      &walk.p.z,      &walk.row,      &walk.col,
+                           &walk.square,  &walk.d_row,    &walk.d_col,    &walk.point.x,  &walk.point.y,
+                           &walk.point.z, &walk.normal.x, &walk.normal.y, &walk.normal.z, &walk.on_rim,
+                           &walk.gain,    &walk.way.x,    &walk.way.y,    &walk.way.z};
   std::copy_n(all_fields, kWalkFields, fields);
 }
 
@@ -131,6 +132,7 @@ SQMAP_KERNEL void Walker::solve(Walk& walk, const VPatch& patch, const V3& error
   walk.d_row = pick(lanes, short_row, walk.d_row);
   walk.d_col = pick(lanes, short_col, walk.d_col);
   walk.gain = pick(lanes, f * short_row + g * short_col, walk.gain);
+  walk.way = pick(lanes, short_row * patch.row + short_col * patch.col, walk.way);
 }
 
 /// `eligible`: the lanes whose cell bounds a patch; the others' walks mean nothing.
@@ -149,6 +151,7 @@ SQMAP_KERNEL Walk Walker::begin(const V3& p, V row, V col, VCell& cell, M& eligi
   walk.point = patch.point;
   walk.normal = cross3(patch.col, patch.row);
   walk.on_rim = walk.d_row = walk.d_col = walk.gain = hn::Zero(kD);
+  walk.way = {walk.gain, walk.gain, walk.gain};
   const M everyone = hn::Eq(walk.on_rim, walk.on_rim);
   solve(walk, patch, error, everyone);
   return walk;
@@ -204,9 +207,11 @@ SQMAP_KERNEL M Walker::advance(Walk& walk, VCell& cell, M active) const noexcept
   walk.point = pick(better, patch.point, walk.point);
   walk.on_rim = pick(better, hn::IfThenElseZero(stays, one), walk.on_rim);
   if (wants_.normal) walk.normal = pick(better, cross3(patch.col, patch.row), walk.normal);
-  walk.d_row = walk.d_row * all(kBackStep);
-  walk.d_col = walk.d_col * all(kBackStep);
-  walk.gain = walk.gain * all(kBackStep);
+  const V kept = pick(active, all(kBackStep), one);
+  walk.d_row = walk.d_row * kept;
+  walk.d_col = walk.d_col * kept;
+  walk.gain = walk.gain * kept;
+  walk.way = kept * walk.way;
   solve(walk, patch, error, better);
   return active;
 }
@@ -362,7 +367,7 @@ HWY_NOINLINE void Walker::set_out_strays(const EntryList& strays) noexcept {
 
 /// From the other start, for points that are far from the surface that was found.
 HWY_NOINLINE void Walker::set_out_again(std::uint32_t begin, std::uint32_t end, EntryList& remote) noexcept {
-  const V far = all(Chart::far_from(part_, looker_.stride()));
+  const V far = all(part_.far_from(looker_.stride()));
   remote.count = 0;
   for (std::uint32_t i = begin; i < end; i += lane_count()) {
     constexpr std::int32_t kBoth = kOther | kInside;
@@ -396,24 +401,21 @@ HWY_NOINLINE void Walker::end(const Walk& walk, VI entry, M lanes) noexcept {
     const M held = hn::And(lanes, looker_.block_holds(part_.fans, cell.texel[0]));
     if (!none(held)) lanes = hn::AndNot(set_aside(walk, cell, entry, held), lanes);
   }
-  const V distance = hn::Sqrt(walk.square);
-  V3 normal{hn::Zero(kD), hn::Zero(kD), hn::Zero(kD)};
+  const V3 further = walk.point + walk.way;
+  const V rest = dot3(walk.p - further, walk.p - further);
+  const M nearer =
+      hn::And(hn::And(is_over(walk), hn::Eq(walk.on_rim, hn::Zero(kD))), hn::Lt(rest, walk.square));
+  const V distance = hn::Sqrt(pick(nearer, rest, walk.square));
+  V3 normal = walk.normal;
   if (wants_.normal) {
-    normal = direction3(walk.normal);
     const M beside_pole =
         hn::Or(hn::Lt(walk.row, all(kBesidePole)), hn::Gt(walk.row, all(looker_.last_row() - kBesidePole)));
     if (!none(hn::And(lanes, beside_pole))) {
       looker_.read(cell);
-      normal = pick(beside_pole, looker_.patch_normal(cell, walk.row, walk.col), normal);
+      normal = pick(beside_pole, looker_.patch_across(cell, walk.row, walk.col), normal);
     }
-    const VI flags = hn::GatherIndex(kDI, entries_.flags, pick(lanes, entry, all_int(kNobody)));
-    const M inside = as_float(hn::Ne(hn::And(flags, all_int(kInside)), hn::Zero(kDI)));
-    const V3 out = pick(inside, walk.point - walk.p, walk.p - walk.point);
-    M turned = hn::Lt(dot3(out, normal), all(kBack) * distance);
-    turned = hn::And(turned, hn::Gt(distance, all(kNearShare * Chart::far_from(part_, looker_.stride()))));
-    if (!none(hn::And(turned, lanes))) normal = pick(turned, direction3(out), normal);
   }
-  write(entry, lanes, walk.row, walk.col, walk.on_rim, distance, walk.point, normal);
+  write(entry, lanes, walk.row, walk.col, walk.on_rim, distance, pick(nearer, further, walk.point), normal);
 }
 
 SQMAP_KERNEL void Walker::write(VI entry, M lanes, V row, V col, V on_rim, V distance, const V3& surface,
@@ -435,7 +437,7 @@ SQMAP_KERNEL void Walker::write(VI entry, M lanes, V row, V col, V on_rim, V dis
     put(distance, kD, entries_.distance);
     put(row, kD, entries_.row);
     put(col, kD, entries_.col);
-    if (wants_.surface) {
+    if (wants_.surface || wants_.normal) {
       put(surface.x, kD, entries_.surface[0]);
       put(surface.y, kD, entries_.surface[1]);
       put(surface.z, kD, entries_.surface[2]);

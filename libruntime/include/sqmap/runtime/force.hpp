@@ -15,12 +15,13 @@ float penetration_m(const Answer& answer) noexcept;
 ///
 /// Zero without contact and for answers without a distance.
 ///
-/// Along a path the force changes by no more than the stiffness times what the point moved, what the map errs
-/// and what the normal turns from facet to facet times the depth, but
-///  - where Answer::part changes: the one flag that an answer carries; charts differ where parts meet;
-///  - at ridges of the distance itself, the medial axis and creases, where another surface is the nearest;
-///  - where the search of layer 3 ends on another hillside or enters a cell with a vertex sample.
-/// The latter two carry no flag. Tracking (effects/tracking.hpp) keeps the force from following any of them.
+/// In layer 3 n is the direction to Answer::surface_m, but at depths of less than about a tenth of a cell of
+/// the map and where the search ends on the rim of a chart. So along a path the force mostly changes by no
+/// more than the stiffness times what the point and surface_m moved, and a jump stands in the answers:
+/// another `part` (charts differ where parts meet), another `inside`, or a surface_m elsewhere, at ridges of
+/// the distance itself (the medial axis) and where the search ends on another hillside. Tracking
+/// (effects/tracking.hpp) keeps the force from following any of them. In layer 2 n is the normal of the map,
+/// which turns from facet to facet.
 Vec3f reaction_force(const Answer& answer, float stiffness_n_per_m) noexcept;
 
 }  // namespace sqmap::runtime

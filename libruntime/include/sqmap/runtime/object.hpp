@@ -47,7 +47,9 @@ struct Answer {
   /// point is then outside the object, farther than `part` can tell), in layer 1, and in layer 2 at few
   /// places inside the mesh, where neither the ray from above nor a search beside it meets a surface.
   float signed_distance_m = std::numeric_limits<float>::quiet_NaN();
-  Vec3f normal;     ///< outward unit normal of the object near the point; zero where unknown
+  /// Outward unit vector; zero where unknown. In layer 3 the direction in which the distance grows, from
+  /// surface_m to the point or back; near the surface, and in the other layers, the surface's normal.
+  Vec3f normal;
   Vec3f surface_m;  ///< the point of the surface that signed_distance_m speaks of; zero where unknown
   std::uint32_t part = kNowhere;  ///< part that answered; kNowhere: outside every superquadric
   Layer layer = Layer::kAuto;     ///< layer that answered; kAuto: none, the bounding spheres or a NaN input
@@ -105,7 +107,7 @@ class Object {
   /// One point, object frame [m]. A point that is not finite gets the default Answer. Bounded time, no
   /// allocation.
   Answer query(const Vec3f& p_m, const QueryOptions& options = {}) const noexcept;
-  /// Many points. Same answers as one at a time. Needs up to 420 KB of stack, as do all questions about
+  /// Many points. Same answers as one at a time. Needs up to 440 KB of stack, as do all questions about
   /// bodies; one point needs 4 KB.
   void query(std::span<const Vec3f> points_m, const Answers& answers,
              const QueryOptions& options = {}) const noexcept;
