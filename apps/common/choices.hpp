@@ -14,10 +14,13 @@
 namespace sqmap::apps {
 
 /// Adds an option that sets `value`, which must outlive the parsing, to what stands behind the word given.
+/// Its type is the words, `auto|always|never`, as help and completion show them.
 template <class Value>
 CLI::Option* add_choice(CLI::App& app, const std::string& name, Value& value,
                         std::vector<std::pair<std::string, Value>> choices, const std::string& help) {
-  return app.add_option_function<std::string>(
+  std::string type;
+  for (const auto& [word, meaning] : choices) type += (type.empty() ? "" : "|") + word;
+  CLI::Option* option = app.add_option_function<std::string>(
       name,
       [name, &value, choices = std::move(choices)](const std::string& word) {
         std::vector<std::string> words;
@@ -31,6 +34,7 @@ CLI::Option* add_choice(CLI::App& app, const std::string& name, Value& value,
         throw CLI::ValidationError(name, none_of(word, words));
       },
       help);
+  return option->type_name(type);
 }
 
 /// The same, where the word itself is the value.

@@ -161,8 +161,7 @@ Exit parse_and_run(const Program& program, Console& console, int argc, char** ar
     runners.emplace_back(sub, command.declare(*sub));
     add_choice<When>(*sub, "--color", color,
                      {{"auto", When::kAuto}, {"always", When::kAlways}, {"never", When::kNever}},
-                     "Colour messages: auto, always, never (default auto; NO_COLOR is honoured)")
-        ->type_name("WHEN");
+                     "Colour messages (default auto; NO_COLOR is honoured)");
     sub->footer(exit_code_table());
     for (CLI::Option* option : sub->get_options())
       if (option->get_positional()) option->type_name("");

@@ -46,6 +46,21 @@ bool takes_path(const CLI::Option& option) {
          (option.get_type_name().starts_with("FILE") || option.get_type_name() == "DIR");
 }
 
+/// Of an option whose value is one of a few words, these: its type is `text|json`.
+std::vector<std::string> words_of(const CLI::Option& option) {
+  const std::string type = option.get_type_name();
+  const auto is_of_words = [](unsigned char c) {
+    return std::islower(c) != 0 || std::isdigit(c) != 0 || c == '|';
+  };
+  std::vector<std::string> words;
+  if (type.find('|') == std::string::npos || !std::ranges::all_of(type, is_of_words)) return words;
+  for (std::size_t start = 0, end; start <= type.size(); start = end + 1) {
+    end = std::min(type.find('|', start), type.size());
+    words.push_back(type.substr(start, end - start));
+  }
+  return words;
+}
+
 /// "-j", "--jobs"
 std::vector<std::string> names_of(const CLI::Option& option) {
   std::vector<std::string> names;
@@ -148,7 +163,8 @@ std::string man_page(const CLI::App& program) {
   return page + ".SH \"EXIT STATUS\"\n" + troff_text(program.get_footer());
 }
 
-/// The commands named so far decide what can follow; the word after an option that takes a path is a path.
+/// The commands named so far decide what can follow; the word after an option that takes a path is a path,
+/// and after one that takes one of a few words, one of these.
 std::string bash_script(const CLI::App& program) {
   const std::string& name = program.get_name();
   std::string words, values;
@@ -159,8 +175,9 @@ std::string bash_script(const CLI::App& program) {
       for (const std::string& each : names_of(*option)) {
         choices.push_back(each);
         if (takes_value(*option))
-          values += fmt::format("    '{} {}') kind={} ;;\n", path_of(app), each,
-                                takes_path(*option) ? "path" : "word");
+          values += fmt::format(
+              "    '{} {}') kind={} ;;\n", path_of(app), each,
+              takes_path(*option) ? "path" : fmt::format("'word {}'", joined(words_of(*option), " ")));
       }
     }
     words += fmt::format("    '{}') words='{}' ;;\n", path_of(app), joined(choices, " "));
@@ -179,7 +196,10 @@ std::string bash_script(const CLI::App& program) {
       "  case \"$path ${{COMP_WORDS[COMP_CWORD-1]}}\" in\n{2}  esac\n"
       "  case $path in\n{3}  esac\n"
       "  compopt +o filenames 2>/dev/null\n"
-      "  if [[ $kind == word ]]; then COMPREPLY=(); return; fi\n"
+      "  if [[ $kind == word* ]]; then\n"
+      "    mapfile -t COMPREPLY < <(compgen -W \"${{kind#word}}\" -- \"$current\")\n"
+      "    return\n"
+      "  fi\n"
       "  if [[ $kind != path && ( $current == -* || ( -z $current && $words != -* ) ) ]]; then\n"
       "    mapfile -t COMPREPLY < <(compgen -W \"$words\" -- \"$current\")\n"
       "    return\n"
@@ -196,6 +216,13 @@ std::string bash_script(const CLI::App& program) {
 
 std::string shell_quoted(const std::string& text) { return "'" + replaced(text, "'", "'\\''") + "'"; }
 
+/// What offers the values of an option.
+std::string zsh_action(const CLI::Option& option) {
+  if (takes_path(option)) return "_files";
+  const std::vector<std::string> words = words_of(option);
+  return words.empty() ? "" : "(" + joined(words, " ") + ")";
+}
+
 std::string zsh_script(const CLI::App& program) {
   const auto function = [](const CLI::App& app) { return "_" + replaced(path_of(app), " ", "_"); };
   std::string script = fmt::format("#compdef {0}\n# zsh completion for {0}, made by `{0} --generate zsh`\n",
@@ -208,8 +235,7 @@ std::string zsh_script(const CLI::App& program) {
       for (const std::string& each : names_of(*option)) {
         std::string spec = fmt::format("{}[{}]", each, help);
         if (takes_value(*option))
-          spec += fmt::format(":{}:{}", replaced(option->get_type_name(), ":", " "),
-                              takes_path(*option) ? "_files" : "");
+          spec += fmt::format(":{}:{}", replaced(option->get_type_name(), ":", " "), zsh_action(*option));
         script += " \\\n    " + shell_quoted(spec);
       }
     }
@@ -253,6 +279,8 @@ std::string fish_script(const CLI::App& program) {
       for (const std::string& each : option->get_snames()) line += " -s " + each;
       for (const std::string& each : option->get_lnames()) line += " -l " + each;
       if (takes_value(*option)) line += takes_path(*option) ? " -r -F" : " -x";
+      if (const std::vector<std::string> words = words_of(*option); !words.empty())
+        line += " -a " + shell_quoted(joined(words, " "));
       script += line + " -d " + shell_quoted(short_help(*option)) + "\n";
     }
   });

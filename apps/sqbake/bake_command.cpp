@@ -214,12 +214,10 @@ void add_output_options(CLI::App& app, BakeArguments& arguments) {
   add_choice<RecordFormat>(
       app, "--format", arguments.format,
       {{"text", RecordFormat::kText}, {"json", RecordFormat::kJson}, {"ndjson", RecordFormat::kNdjson}},
-      "Results on stdout: text, json, ndjson (default text)")
-      ->type_name("FORMAT");
+      "Results on stdout: text, json, ndjson (default text)");
   add_choice<When>(app, "--progress", arguments.progress,
                    {{"auto", When::kAuto}, {"always", When::kAlways}, {"never", When::kNever}},
-                   "auto: a line on a terminal; always: also one line a stage in logs; never (default auto)")
-      ->type_name("WHEN");
+                   "auto: a line on a terminal; always: also one line a stage in logs; never (default auto)");
   CLI::Option* quiet =
       app.add_flag("-q,--quiet", arguments.quiet, "Only errors, and what is degraded; no table");
   app.add_flag("-v,--verbose", arguments.verbose, "Add the time of every stage to the table")

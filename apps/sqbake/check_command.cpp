@@ -93,8 +93,7 @@ std::function<Exit(Console&)> declare_check(CLI::App& app) {
   app.add_option("INPUT", args->input, "Mesh file")->required();
   constexpr std::array<std::string_view, 3> kMeshSettings{"unit", "up", "repair"};
   add_setting_options(app, kMeshSettings, args->settings);
-  add_words(app, "--format", args->format, {"text", "json"}, "text or json (default text)")
-      ->type_name("FORMAT");
+  add_words(app, "--format", args->format, {"text", "json"}, "text or json (default text)");
   return [args](Console& console) {
     return run_confined(console, {{.heap_bytes = physical_memory_bytes(), .may_start_threads = true},
                                   args->input.string(),

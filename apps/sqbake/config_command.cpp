@@ -95,8 +95,8 @@ std::function<Exit(Console&)> declare_config(CLI::App& app) {
   show->add_option("--manifest", args->manifest, "As of `sqbake bake`")->type_name("FILE.toml");
   show->add_option("--config", args->request.project, "As of `sqbake bake`")->type_name("FILE.toml");
   show->add_flag("!--no-config", args->request.use_files, "As of `sqbake bake`");
-  add_words(*show, "--format", args->format, {"text", "json"}, "text or json, one line a mesh (default text)")
-      ->type_name("FORMAT");
+  add_words(*show, "--format", args->format, {"text", "json"},
+            "text or json, one line a mesh (default text)");
   add_all_setting_options(*show, args->request.command_line);
   return [args](Console& console) { return run_show(console, *args); };
 }

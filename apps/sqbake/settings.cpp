@@ -160,13 +160,12 @@ std::string default_fallback() { return name_of<Fallback>(kDefaults.fallback, kF
 constexpr std::array<Setting, 12> kSettings{{
     {"unit", "UNIT", "Unit of the coordinates: m, cm, mm, um, in, ft or a number of metres", default_unit,
      apply_unit},
-    {"up", "AXIS", "Axis of the input that points up: x, y, z; turned to z", default_up, apply_up},
-    {"repair", "POLICY",
+    {"up", "x|y|z", "Axis of the input that points up; turned to z", default_up, apply_up},
+    {"repair", "none|safe|all",
      "none: drop only faces without area; safe: also weld, drop duplicates,\norient; all: also fill small "
      "holes",
      default_repair, apply_repair},
-    {"quality", "NAME",
-     "draft, standard or fine: sets the three limits below, where they are not given\nthemselves",
+    {"quality", "draft|standard|fine", "Sets the three limits below, where they are not given themselves",
      default_quality, apply_quality},
     {"max-error", "PCT|LENGTH",
      "Stop refining at this mean error of eq. 35: a percentage of R_max, the\nlargest distance between two "
@@ -187,7 +186,7 @@ constexpr std::array<Setting, 12> kSettings{{
      "Memory (heap) that the bake of a mesh may take: e.g. 2G; machine: as much as the\nmachine has, which "
      "stops what could never fit; or none",
      default_memory, apply_memory},
-    {"fallback", "KIND",
+    {"fallback", "none|superquadric",
      "For a mesh that ran into a limit, crashed or could not be baked:\nnone, or superquadric: bake one for "
      "the "
      "whole mesh, marked as degraded",

@@ -78,8 +78,7 @@ std::function<Exit(Console&)> declare_diff(CLI::App& app) {
       ->type_name("T");
   app.add_flag("--ignore-provenance", args->ignore_provenance,
                "Leave out program, version, options, and name and hash of the source");
-  add_words(app, "--format", args->format, {"text", "json"}, "text or json (default text)")
-      ->type_name("FORMAT");
+  add_words(app, "--format", args->format, {"text", "json"}, "text or json (default text)");
   return [args](Console& console) { return run_diff(console, *args); };
 }
 

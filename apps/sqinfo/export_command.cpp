@@ -180,7 +180,6 @@ std::function<Exit(Console&)> declare_export(CLI::App& app) {
   CLI::Option* seg = app.add_option("--seg", args->seg, "Segmentation to write")->type_name("FILE.seg");
   add_words(app, "--level", args->labels, {"parts", "segments"},
             "What a label of --seg numbers: segments (natural parts) or parts (default parts)")
-      ->type_name("LEVEL")
       ->needs(seg);
   app.add_option("--maps", args->maps, "Folder for the pictures")->type_name("DIR");
   app.add_option("--map-level", args->map_level,

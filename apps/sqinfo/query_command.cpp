@@ -115,8 +115,7 @@ std::function<Exit(Console&)> declare_query(CLI::App& app) {
   add_choice<Layer>(
       app, "--layer", args->options.layer,
       {{"auto", Layer::kAuto}, {"1", Layer::kOne}, {"2", Layer::kTwo}, {"3", Layer::kThree}},
-      "1: superquadrics only; 2: distance map; 3: closest point; auto: 2 or 3 by resolution (default auto)")
-      ->type_name("LAYER");
+      "1: superquadrics only; 2: distance map; 3: closest point; auto: 2 or 3 by resolution (default auto)");
   app.add_option("--level", args->options.level, "Level of the maps, 0 the finest (default 0)")
       ->check(CLI::Range(0, 31).description(""))
       ->type_name("LEVEL");

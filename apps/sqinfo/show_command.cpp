@@ -256,8 +256,7 @@ std::function<Exit(Console&)> declare_show(CLI::App& app) {
       "  sqinfo show hand.h5\n"
       "  sqinfo show hand.h5 --format json\n");
   app.add_option("BUNDLE", args->bundle, "Bundle file")->required();
-  add_words(app, "--format", args->format, {"text", "json"}, "text or json (default text)")
-      ->type_name("FORMAT");
+  add_words(app, "--format", args->format, {"text", "json"}, "text or json (default text)");
   return [args](Console& console) { return run_show(console, *args); };
 }
 

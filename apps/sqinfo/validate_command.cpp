@@ -67,10 +67,8 @@ std::function<Exit(Console&)> declare_validate(CLI::App& app) {
   app.add_option("BUNDLE", args->bundle, "Bundle file")->required();
   add_choice<CheckLevel>(
       app, "--level", args->level, {{"quick", CheckLevel::kQuick}, {"full", CheckLevel::kFull}},
-      "quick: what a reader must trust; full: also orders, codes and bounds (default full)")
-      ->type_name("LEVEL");
-  add_words(app, "--format", args->format, {"text", "json"}, "text or json (default text)")
-      ->type_name("FORMAT");
+      "quick: what a reader must trust; full: also orders, codes and bounds (default full)");
+  add_words(app, "--format", args->format, {"text", "json"}, "text or json (default text)");
   return [args](Console& console) { return run_validate(console, *args); };
 }
 

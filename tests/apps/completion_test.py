@@ -52,6 +52,20 @@ class Documents(FolderTest):
             self.assertEqual(self.complete(line.split()[0], line), {"hand.off"}, line)
         self.assertEqual(self.complete("sqbake", "sqbake bake x.off --max-parts h"), set())
 
+    def test_words_are_offered_where_one_of_a_few_is_due(self):
+        (self.folder / "fine.off").touch()
+        words = {"sqbake bake x.off --quality ": {"draft", "standard", "fine"},
+                 "sqbake bake x.off --quality f": {"fine"}, "sqbake bake x.off --taper ": {"on", "off"},
+                 "sqbake cache stats --format ": {"text", "json"}, "sqinfo query x.h5 --layer ": {"auto", "1", "2", "3"},
+                 "sqinfo show --color a": {"auto", "always"}}
+        for line, expected in words.items():
+            self.assertEqual(self.complete(line.split()[0], line), expected, line)
+            option = line.split()[-1 if line.endswith(" ") else -2]
+            for kind in ("fish", "zsh"):
+                lines = [each for each in self.document(line.split()[0], kind).read_text(encoding="utf-8").splitlines()
+                         if re.search(rf"{option.strip('-')}\b", each)]
+                self.assertTrue(any(expected <= set(re.findall(r"\w+", each)) for each in lines), f"{line} {kind}")
+
     def test_man_pages_have_every_option_and_every_exit_code(self):
         for program, commands in PROGRAMS.items():
             page = self.document(program, "man").read_text(encoding="utf-8").replace("\\-", "-")

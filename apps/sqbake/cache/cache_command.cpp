@@ -154,8 +154,7 @@ std::function<Exit(Console&)> declare_cache(CLI::App& app) {
                  "Folder (default: SQMAP_CACHE_DIR, else sqmap in XDG_CACHE_HOME,\n"
                  "else ~/.cache/sqmap; none where SQMAP_CACHE_DIR is set to nothing)")
       ->type_name("DIR");
-  add_words(app, "--format", args->format, {"text", "json"}, "text or json (default text)")
-      ->type_name("FORMAT");
+  add_words(app, "--format", args->format, {"text", "json"}, "text or json (default text)");
   CLI::App* stats = app.add_subcommand("stats", "How much is in it")->fallthrough();
   CLI::App* verify =
       app.add_subcommand("verify", "Read all of it; remove what is damaged, then exit 1")->fallthrough();

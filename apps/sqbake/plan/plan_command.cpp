@@ -113,8 +113,7 @@ std::function<Exit(Console&)> declare_plan(CLI::App& app) {
       ->excludes(shards)
       ->type_name("I/N");
   add_words(app, "--format", args->format, {"text", "ndjson"},
-            "text or ndjson, one line a mesh (default text)")
-      ->type_name("FORMAT");
+            "text or ndjson, one line a mesh (default text)");
   return [args](Console& console) { return run_plan(console, *args); };
 }
 
