@@ -159,9 +159,8 @@ HWY_NOINLINE void Answerer::second_layer() noexcept {
       hn::StoreU(look.distance, kD, entries_.distance + i);
       hn::StoreU(look.certainty, kD, entries_.certainty + i);
       hn::StoreU(look.flags, kDI, entries_.flags + i);
-      hn::StoreU(look.start, kDI, entries_.start + i);
-      hn::StoreU(look.foot_row, kD, entries_.other_row + i);
-      hn::StoreU(look.foot_col, kD, entries_.other_col + i);
+      hn::StoreU(look.foot_row, kD, entries_.foot_row + i);
+      hn::StoreU(look.foot_col, kD, entries_.foot_col + i);
     }
     if (part.bound_cells > 0) prove(resident_, part, range, entries_);
   }

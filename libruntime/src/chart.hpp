@@ -160,6 +160,8 @@ class Chart {
   Start start_at(const Vec3f& p, float row, float col, std::uint32_t stride) const noexcept;
   /// In the nearest of the eight cells of the first ring around (row, col) that has one with a patch.
   Start start_beside(const Vec3f& p, float row, float col, std::uint32_t stride) const noexcept;
+  /// The nearest of the places that the table of starts names around p.
+  Start start_named(const Vec3f& p, std::uint32_t stride) const noexcept;
   Patch patch_at(const Cell& cell, float row, float col, std::uint32_t stride) const noexcept;
   /// Outwards across the represented surface at (row, col) of the cell; of no certain length.
   Vec3f patch_across(const Cell& cell, float row, float col, std::uint32_t stride) const noexcept {
@@ -248,16 +250,12 @@ inline ChartAnswer Chart::look(const Vec3f& p, bool third, std::uint32_t level, 
     // elsewhere, and one whose foot has no patch begins where that is nearer. Points outside the mesh, the
     // most of those that touch nothing, do with the foot; an inner point needs a distance, or it would feel
     // no force.
-    Start first, other;
-    if (answer.bounds_patch) first = start_at(p, foot.row, foot.col, stride);
-    if (answer.inside) {
-      const std::uint16_t named = resident_.start(part_, foot.row, foot.col, foot.depth_m);
-      if (named != StartTable::kNone)
-        other = start_at(p, part_.starts.place(named >> 8U), part_.starts.place(named & 255U), stride);
-      if (!answer.bounds_patch) {
-        first = start_beside(p, foot.row, foot.col, stride);
-        if (other.square < first.square) std::swap(first, other);
-      }
+    Start first;
+    if (answer.bounds_patch) {
+      first = start_at(p, foot.row, foot.col, stride);
+    } else if (answer.inside) {
+      first = start_beside(p, foot.row, foot.col, stride);
+      if (const Start named = start_named(p, stride); named.square < first.square) first = named;
     }
     ChartAnswer refined = answer;
     if (std::isfinite(first.square)) {
@@ -267,20 +265,18 @@ inline ChartAnswer Chart::look(const Vec3f& p, bool third, std::uint32_t level, 
       // A crossing that is on no patch stands where it is nearer.
       if (!answer.has_point || refined.distance < answer.distance) answer = refined;
     }
-    if (std::isfinite(other.square) && answer.distance > part_.far_from(stride)) {
-      refined.row = other.row;
-      refined.col = other.col;
-      third_layer(p, stride, refined);
-      if (refined.distance < answer.distance) answer = refined;
+    if (answer.inside && answer.bounds_patch && answer.distance > part_.far_from(stride)) {
+      if (const Start other = start_named(p, stride); std::isfinite(other.square)) {
+        refined.row = other.row;
+        refined.col = other.col;
+        third_layer(p, stride, refined);
+        if (refined.distance < answer.distance) answer = refined;
+      }
     }
   } else if (answer.inside && !std::isfinite(answer.distance)) {
     // Layer 2 of an inner point above which the ray meets nothing: it would feel no force. The search of
     // layer 3 tells how far it is from the surface, from where the table of starts says.
-    const std::uint16_t named = resident_.start(part_, foot.row, foot.col, foot.depth_m);
-    Start other;
-    if (named != StartTable::kNone)
-      other = start_at(p, part_.starts.place(named >> 8U), part_.starts.place(named & 255U), stride);
-    if (std::isfinite(other.square)) {
+    if (const Start other = start_named(p, stride); std::isfinite(other.square)) {
       answer.row = other.row;
       answer.col = other.col;
       third_layer(p, stride, answer);
@@ -436,6 +432,17 @@ inline Chart::Start Chart::start_beside(const Vec3f& p, float row, float col,
       const Start start = start_at(p, here_row, here_col, stride);
       if (start.square < best.square) best = start;
     }
+  }
+  return best;
+}
+
+inline Chart::Start Chart::start_named(const Vec3f& p, std::uint32_t stride) const noexcept {
+  Start best;
+  for (int k = 0; k < StartTable::kAround; ++k) {
+    const std::uint16_t name = resident_.start(part_, p, k);
+    if (name == StartTable::kNone) continue;
+    const Start start = start_at(p, part_.starts.place(name >> 8U), part_.starts.place(name & 255U), stride);
+    if (start.square < best.square) best = start;
   }
   return best;
 }

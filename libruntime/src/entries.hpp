@@ -21,7 +21,7 @@ enum EntryFlag : std::int32_t {
   kRefined = 32,  ///< surface and normal are layer 3's
   kWithin = 64,   ///< layer 2 cannot rule out that the surface is as near as Wants::reach
   kWanted = 128,  ///< its surface and normal will be asked for
-  kOther = 256,   ///< layer 3 may begin again at (other_row, other_col); in layer 2, where it must begin
+  kAgain = 256,   ///< the search of layer 3 may begin again where StartTable says; in layer 2, must begin
   kAnswer = 512,  ///< the nearest of its point: its distance is the answer
 };
 
@@ -36,9 +36,8 @@ struct alignas(64) Entries {
   std::int32_t point[kLength];               ///< place in the chunk
   std::int32_t flags[kLength];
   float row[kLength], col[kLength], crossing[kLength], distance[kLength];
-  float certainty[kLength];     ///< of those with kAnswer, once they are combined: ChartAnswer::offset
-  std::int32_t start[kLength];  ///< of inner points for layer 3: Resident::start
-  float other_row[kLength], other_col[kLength];   ///< the foot, until layer 3 begins
+  float certainty[kLength];  ///< of those with kAnswer, once they are combined: ChartAnswer::offset
+  float foot_row[kLength], foot_col[kLength];
   float surface[3][kLength], normal[3][kLength];  ///< part frame; in the end those wanted, in the object's
   EntryRange ranges[kMostRanges];
   std::uint32_t count, range_count;

@@ -6,7 +6,7 @@
 /// What layer 2 knows of the lanes of one vector.
 struct Look {
   V row, col, crossing, distance, certainty, foot_row, foot_col;
-  VI flags, start;
+  VI flags;
 };
 
 struct VCell {
@@ -51,6 +51,20 @@ class Looker {
     if (!none(hn::AndNot(on_patch, lanes)))
       normal = pick(on_patch, normal, sample_at(tables_, row, col).normal);
     return pick(leaving, all(-1.0F), all(1.0F)) * normal;
+  }
+  /// Resident::start.
+  HWY_INLINE VI start_of(const V3& p, int k) const noexcept {
+    const StartTable& starts = part_.starts;
+    const auto along = [&](V coordinate, int axis) HWY_ATTR {
+      const auto count = static_cast<float>(starts.boxes[axis]);
+      const V place = (coordinate * all(part_.inverse_extents[axis]) + all(1.0F)) * all(0.5F * count) +
+                      all((k >> axis & 1) == 0 ? -0.5F : 0.5F);
+      return to_int(limited(place, hn::Zero(kD), all(count - 1.0F)));
+    };
+    const VI slice = along(p.z, 2) * all_int(starts.boxes[1]) + along(p.y, 1);
+    const VI box = slice * all_int(starts.boxes[0]) + along(p.x, 0);
+    const VU word = gather_bytes(resident_.bytes() + starts.at, hn::ShiftLeft<1>(box));
+    return hn::BitCast(kDI, hn::And(word, hn::Set(kDU, 0xFFFFU)));
   }
   /// Of what Resident::start names.
   HWY_INLINE V start_row(VI start) const noexcept { return start_place(hn::ShiftRight<8>(start)); }
@@ -152,19 +166,6 @@ class Looker {
     const StartTable& starts = part_.starts;
     const VI first = hn::ShiftLeftSame(k, starts.step_shift) + all_int((1U << starts.step_shift) / 2);
     return to_float(first) + all(0.5F);
-  }
-  /// Resident::start.
-  HWY_INLINE VI start_of(V row, V col, V depth) const noexcept {
-    const StartTable& starts = part_.starts;
-    const V zero = hn::Zero(kD);
-    const VI cell_row = hn::Min(to_int(most(row, zero)), all_int(part_.rows - 1));
-    const VI cell_col = hn::Min(to_int(most(col, zero)), all_int(part_.cols - 1));
-    const VI tile = hn::ShiftRightSame(cell_row, starts.tile_shift) * all_int(starts.tile_cols) +
-                    hn::ShiftRightSame(cell_col, starts.tile_shift);
-    const V level = limited(depth * all(starts.depths_per_unit), zero, all(StartTable::kDepths - 1.0F));
-    const VI place = tile * all_int(StartTable::kDepths) + to_int(level);
-    const VU word = gather_bytes(resident_.bytes() + starts.at, hn::ShiftLeft<1>(place));
-    return hn::BitCast(kDI, hn::And(word, hn::Set(kDU, 0xFFFFU)));
   }
   HWY_NOINLINE void further_sheets(M lanes, VI texel, V shift, V depth, V& gap, V& crossing, V& inside,
                                    V& leaving, V& later) const noexcept;
@@ -270,18 +271,10 @@ SQMAP_KERNEL Look Looker::look(const V3& p, M wanted, float reach) const noexcep
                       hn::Or(flag(leaves, kLeaving), flag(corners.eligible, kPatch)));
   if (reach > 0)
     look.flags = hn::Or(look.flags, flag(hn::Lt(all(part_.depth_min) - foot.depth, all(reach)), kWithin));
-  look.start = all_int(StartTable::kNone);
   // What the bounds prove may yet turn a point outside into one inside.
   const M inner = part_.bound_cells > 0 ? wanted : hn::And(inside, wanted);
-  if (third_ && !none(inner)) look.start = pick(inner, start_of(foot.row, foot.col, foot.depth), look.start);
   const M lost = hn::And(inner, hn::Eq(look.distance, all(std::numeric_limits<float>::infinity())));
-  if (!third_ && !none(lost)) {
-    const VI other = start_of(foot.row, foot.col, foot.depth);
-    const M named = hn::And(lost, as_float(hn::Ne(other, all_int(StartTable::kNone))));
-    look.flags = hn::Or(look.flags, flag(named, kOther));
-    look.foot_row = pick(named, start_row(other), look.foot_row);
-    look.foot_col = pick(named, start_col(other), look.foot_col);
-  }
+  if (!third_) look.flags = hn::Or(look.flags, flag(lost, kAgain));
   const V sure = pick(as_float(mixed), most(foot.depth, zero), all(part_.sphere_radius));
   look.certainty = least(gap, sure) / most(doubt, all(kLeastDoubt * part_.sphere_radius));
   return look;

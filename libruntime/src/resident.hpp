@@ -12,7 +12,7 @@
 //              then err by half a unit, and differences of neighbours, which make the second derivatives,
 //              hardly more), and the steps at the nodes
 //     bounds   BoundCell[6 bound_cells^2], where the asset has bounds
-//     starts   StartTable: where layer 3 may begin, 16 bits for each of kDepths depths below each tile
+//     starts   StartTable: where layer 3 may begin, 16 bits a box
 //     texels   one a node, row-major, `texel_bits` each, least significant bit first: the depth code and,
 //     where
 //              the part has a seam, above it the bit that the node starts inside the mesh
@@ -58,22 +58,22 @@ struct Slabs {
   static Slabs of(const Vec3f& inverse_extents, double e1, double e2, double taper = 0) noexcept;
 };
 
-/// Where a search for the nearest point of the represented surface may begin, besides the foot. Tiles of the
-/// map, and the depths below each of them, are boxes of the superquadric's inside; each names the cell of the
-/// map whose patch is nearest to its middle, among those of a coarser grid, as row << 8 | column of that
-/// grid. Filled by fill_starts() from the maps; not part of the asset.
+/// Where a search for the nearest point of the represented surface may begin, besides the foot. The box of
+/// the superquadric is cut into boxes, each of which names the cell of the map whose patch is nearest to its
+/// middle, among those of a coarser grid, as row << 8 | column of that grid. A point asks the eight boxes
+/// around it and begins at the nearest place they name: near the medial axis one alone often names the wrong
+/// side. Filled by fill_starts() from the maps; not part of the asset.
 struct StartTable {
-  static constexpr std::uint32_t kDepths = 4;
+  static constexpr std::uint32_t kMostBoxes = 256;
+  static constexpr int kAround = 8;
   static constexpr std::uint16_t kNone = 0xFFFF;  ///< the part has no patch
 
-  std::uint32_t at{};  ///< byte offset
-  std::uint32_t tile_rows{}, tile_cols{};
-  std::uint8_t tile_shift{};  ///< log2 of a tile's side [cells]
+  std::uint32_t at{};         ///< byte offset
+  std::uint32_t boxes[3]{};   ///< along x, y and z; x counts fastest
   std::uint8_t step_shift{};  ///< log2 of the coarser grid's spacing [cells]
-  float depths_per_unit{};
 
   static StartTable of(std::uint32_t rows, std::uint32_t cols, const Vec3f& half_extents) noexcept;
-  std::size_t bytes() const noexcept { return std::size_t{2} * kDepths * tile_rows * tile_cols; }
+  std::size_t bytes() const noexcept { return std::size_t{2} * boxes[0] * boxes[1] * boxes[2]; }
   /// Of a row or column of the coarser grid: that of the middle of its cell in the map.
   float place(std::uint32_t k) const noexcept {
     const std::uint32_t cell = (k << step_shift) + (1U << step_shift) / 2;
@@ -162,16 +162,17 @@ class Resident {
     return load<BoundCell>(part.curves_at + kCurveBytes +
                            cell * static_cast<std::uint32_t>(sizeof(BoundCell)));
   }
-  /// StartTable: where to begin for a point at `depth` below (row, col), or kNone.
-  std::uint16_t start(const PartRecord& part, float row, float col, float depth) const noexcept {
+  /// StartTable: what the k-th of the boxes around p, part frame, names, or kNone.
+  std::uint16_t start(const PartRecord& part, const Vec3f& p, int k) const noexcept {
     const StartTable& starts = part.starts;
-    const std::uint32_t cell_row = std::min(static_cast<std::uint32_t>(greater(row, 0.0F)), part.rows - 1);
-    const std::uint32_t cell_col = std::min(static_cast<std::uint32_t>(greater(col, 0.0F)), part.cols - 1);
-    const std::uint32_t tile =
-        (cell_row >> starts.tile_shift) * starts.tile_cols + (cell_col >> starts.tile_shift);
-    const float level = lesser(greater(depth * starts.depths_per_unit, 0.0F), StartTable::kDepths - 1.0F);
-    return load<std::uint16_t>(starts.at +
-                               2 * (tile * StartTable::kDepths + static_cast<std::uint32_t>(level)));
+    std::uint32_t box = 0;
+    for (int axis = 2; axis >= 0; --axis) {
+      const auto count = static_cast<float>(starts.boxes[axis]);
+      const float place = (p[axis] * part.inverse_extents[axis] + 1.0F) * (0.5F * count) +
+                          ((k >> axis & 1) == 0 ? -0.5F : 0.5F);
+      box = box * starts.boxes[axis] + static_cast<std::uint32_t>(lesser(greater(place, 0.0F), count - 1.0F));
+    }
+    return load<std::uint16_t>(starts.at + 2 * box);
   }
   /// Position of the first entry of a list with key >= `key`, or `count`, without a search where its block is
   /// empty.

@@ -15,8 +15,6 @@ namespace sqmap::runtime {
 
 namespace {
 
-constexpr std::uint32_t kLeastTileShift = 3;     // tiles of 8 x 8 cells
-constexpr std::uint32_t kMostTiles = 128;        // or larger ones
 constexpr std::uint32_t kMostCandidates = 2048;  // cells of the coarser grid
 constexpr std::uint32_t kMostSide = 255;         // of that grid, less than what kNone names
 constexpr std::uint32_t kGroupShift = 2;         // groups of 4 x 4 candidates
@@ -37,26 +35,29 @@ std::uint32_t side_of(std::uint32_t cells, std::uint32_t step_shift) noexcept {
   return cells > first ? ((cells - 1 - first) >> step_shift) + 1 : 0;
 }
 
-std::uint32_t tiles_of(std::uint32_t cells, std::uint32_t shift) noexcept {
-  return ((cells - 1) >> shift) + 1;
-}
-
 }  // namespace
 
 StartTable StartTable::of(std::uint32_t rows, std::uint32_t cols, const Vec3f& half_extents) noexcept {
   StartTable table;
-  std::uint32_t tile = kLeastTileShift, step = 0;
-  // A foot may lie on the last row of nodes.
-  while (tiles_of(rows, tile) * tiles_of(cols, tile) > kMostTiles) ++tile;
+  std::uint32_t step = 0;
   while (side_of(rows - 1, step) * side_of(cols, step) > kMostCandidates ||
          side_of(rows - 1, step) > kMostSide || side_of(cols, step) > kMostSide)
     ++step;
-  table.tile_shift = static_cast<std::uint8_t>(tile);
   table.step_shift = static_cast<std::uint8_t>(step);
-  table.tile_rows = tiles_of(rows, tile);
-  table.tile_cols = tiles_of(cols, tile);
-  // No point of a superquadric lies deeper than the shortest half extent of its box.
-  table.depths_per_unit = kDepths / lesser(lesser(half_extents.x, half_extents.y), half_extents.z);
+  // Cubes, as nearly as their number allows: shortest side first, the others share what it leaves.
+  int order[] = {0, 1, 2};
+  std::stable_sort(std::begin(order), std::end(order),
+                   [&](int a, int b) { return half_extents[a] < half_extents[b]; });
+  double left = kMostBoxes;
+  double volume = double{half_extents.x} * double{half_extents.y} * double{half_extents.z};
+  for (int k = 0; k < 3; ++k) {
+    const double extent = half_extents[order[k]];
+    const double count =
+        std::clamp(std::floor(extent / std::pow(volume / left, 1.0 / (3 - k)) + 1e-9), 1.0, left);
+    table.boxes[order[k]] = static_cast<std::uint32_t>(count);
+    left = std::floor(left / count);
+    volume /= extent;
+  }
   return table;
 }
 
@@ -93,18 +94,16 @@ void Resident::fill_starts(const PartRecord& part) {
   }
   if (groups.empty()) return;
 
-  const float tile = static_cast<float>(1U << starts.tile_shift);
   std::vector<float> distance(groups.size());
   std::uint8_t* out = bytes_.get() + starts.at;
-  for (std::uint32_t row = 0; row < starts.tile_rows; ++row) {
-    for (std::uint32_t col = 0; col < starts.tile_cols; ++col) {
-      const float mid_row =
-          lesser((static_cast<float>(row) + 0.5F) * tile, static_cast<float>(part.rows - 1));
-      const float mid_col = lesser((static_cast<float>(col) + 0.5F) * tile, static_cast<float>(part.cols));
-      const SurfaceSample<float> surface = shape.sample(mid_row, mid_col);
-      for (std::uint32_t k = 0; k < StartTable::kDepths; ++k, out += 2) {
-        const float depth = (static_cast<float>(k) + 0.5F) / starts.depths_per_unit;
-        const Vec3f p = surface.point_m - depth * surface.normal;
+  const auto middle = [&](std::uint32_t k, int axis) {
+    const float share = (static_cast<float>(k) + 0.5F) / static_cast<float>(starts.boxes[axis]);
+    return (2 * share - 1) / part.inverse_extents[axis];
+  };
+  for (std::uint32_t z = 0; z < starts.boxes[2]; ++z) {
+    for (std::uint32_t y = 0; y < starts.boxes[1]; ++y) {
+      for (std::uint32_t x = 0; x < starts.boxes[0]; ++x, out += 2) {
+        const Vec3f p{middle(x, 0), middle(y, 1), middle(z, 2)};
         for (std::size_t g = 0; g < groups.size(); ++g) distance[g] = norm(groups[g].centre - p);
         const auto closest = std::min_element(distance.begin(), distance.end()) - distance.begin();
         Candidate best{{}, StartTable::kNone};

@@ -87,6 +87,7 @@ class Walker {
   }
   SQMAP_KERNEL Walk begin(const V3& p, V row, V col, VCell& cell, M& eligible) const noexcept;
   HWY_NOINLINE V find_beside(const V3& p, M lanes, V& row, V& col) const noexcept;
+  HWY_NOINLINE V find_named(const V3& p, M lanes, V& row, V& col) const noexcept;
   HWY_NOINLINE void set_out(std::uint32_t i, M wanted, EntryList& strays) noexcept;
   HWY_NOINLINE void set_out_strays(const EntryList& strays) noexcept;
   HWY_NOINLINE void set_out_again(std::uint32_t begin, std::uint32_t end, EntryList& remote) noexcept;
@@ -297,6 +298,33 @@ HWY_NOINLINE V Walker::find_beside(const V3& p, M lanes, V& row, V& col) const n
   return best;
 }
 
+/// Chart::start_named, which sets (row, col): how far from the start, squared; infinite where there is none.
+HWY_NOINLINE V Walker::find_named(const V3& p, M lanes, V& row, V& col) const noexcept {
+  V best = all(std::numeric_limits<float>::infinity());
+  VI chosen = all_int(StartTable::kNone);
+  row = col = hn::Zero(kD);
+  for (int k = 0; k < StartTable::kAround; ++k) {
+    const VI name = pick(lanes, looker_.start_of(p, k), all_int(StartTable::kNone));
+    // Most of the boxes around a point name the same.
+    const M is_new =
+        hn::And(as_float(hn::Ne(name, all_int(StartTable::kNone))), as_float(hn::Ne(name, chosen)));
+    if (none(is_new)) continue;
+    const VI known = pick(is_new, name, hn::Zero(kDI));
+    const V here_row = looker_.start_row(known), here_col = looker_.start_col(known);
+    VCell cell = looker_.cell_at(here_row, here_col);
+    const M open = hn::And(is_new, looker_.read(cell).eligible);
+    if (none(open)) continue;
+    const V3 error = p - looker_.patch_at(cell, here_row, here_col).point;
+    const V square = dot3(error, error);
+    const M better = hn::And(open, hn::Lt(square, best));
+    best = pick(better, square, best);
+    row = pick(better, here_row, row);
+    col = pick(better, here_col, col);
+    chosen = pick(better, name, chosen);
+  }
+  return best;
+}
+
 /// From the foot. Inner points that have no patch there are set aside.
 HWY_NOINLINE void Walker::set_out(std::uint32_t i, M wanted, EntryList& strays) noexcept {
   const VI flags = hn::LoadU(kDI, entries_.flags + i), entry = hn::Iota(kDI, static_cast<std::int32_t>(i));
@@ -306,15 +334,9 @@ HWY_NOINLINE void Walker::set_out(std::uint32_t i, M wanted, EntryList& strays) 
   const M at_foot = hn::And(wanted, has(kPatch)), inside = hn::And(wanted, has(kInside));
   strays.append(entry, hn::AndNot(at_foot, inside));
   if (none(at_foot)) return;
-  const V row = hn::LoadU(kD, entries_.other_row + i), col = hn::LoadU(kD, entries_.other_col + i);
-  const M other = hn::And(at_foot, inside);
-  if (!none(other)) {
-    const VI start = hn::LoadU(kDI, entries_.start + i);
-    const M named = hn::And(other, as_float(hn::Ne(start, all_int(StartTable::kNone))));
-    hn::StoreU(pick(named, looker_.start_row(start), row), kD, entries_.other_row + i);
-    hn::StoreU(pick(named, looker_.start_col(start), col), kD, entries_.other_col + i);
-    hn::StoreU(hn::Or(flags, pick(named, all_int(kOther), hn::Zero(kDI))), kDI, entries_.flags + i);
-  }
+  const VI again = pick(hn::And(at_foot, inside), all_int(kAgain), hn::Zero(kDI));
+  hn::StoreU(hn::Or(flags, again), kDI, entries_.flags + i);
+  const V row = hn::LoadU(kD, entries_.foot_row + i), col = hn::LoadU(kD, entries_.foot_col + i);
   VCell cell;
   M eligible;
   Walk walk = begin(load3(entries_.x, entries_.y, entries_.z, i), row, col, cell, eligible);
@@ -323,7 +345,7 @@ HWY_NOINLINE void Walker::set_out(std::uint32_t i, M wanted, EntryList& strays) 
   first_in_a_row_ = kNobody;
 }
 
-/// Beside the foot or, where that is nearer, from where the table of starts says.
+/// Beside the foot or, where that is nearer, where the table of starts says.
 HWY_NOINLINE void Walker::set_out_strays(const EntryList& strays) noexcept {
   const V infinity = all(std::numeric_limits<float>::infinity());
   for (std::uint32_t i = 0; i < strays.count; i += lane_count()) {
@@ -333,30 +355,12 @@ HWY_NOINLINE void Walker::set_out_strays(const EntryList& strays) noexcept {
       return hn::IfThenElseZero(wanted, hn::GatherIndex(kD, values, entry));
     };
     const V3 p{field(entries_.x), field(entries_.y), field(entries_.z)};
-    V row = field(entries_.other_row), col = field(entries_.other_col);
-    const V square = find_beside(p, wanted, row, col);
-    const M beside = hn::And(wanted, hn::Lt(square, infinity));
-    M lanes = beside;
-    const VI none_known = all_int(StartTable::kNone);
-    const VI start = pick(wanted, hn::GatherIndex(kDI, entries_.start, entry), none_known);
-    const M named = as_float(hn::Ne(start, none_known));
-    const VI place = pick(named, start, hn::Zero(kDI));
-    const V there_row = looker_.start_row(place), there_col = looker_.start_col(place);
-    VCell there = looker_.cell_at(there_row, there_col);
-    const M open = hn::And(named, looker_.read(there).eligible);
-    if (!none(open)) {
-      const V3 error = p - looker_.patch_at(there, there_row, there_col).point;
-      const M nearer = hn::And(open, hn::Lt(dot3(error, error), square));
-      const M both = hn::And(open, beside);
-      const VI other = pick(both, entry, all_int(kNobody));
-      hn::ScatterIndex(pick(nearer, row, there_row), kD, entries_.other_row, other);
-      hn::ScatterIndex(pick(nearer, col, there_col), kD, entries_.other_col, other);
-      hn::ScatterIndex(hn::Or(hn::GatherIndex(kDI, entries_.flags, other), all_int(kOther)), kDI,
-                       entries_.flags, other);
-      row = pick(nearer, there_row, row);
-      col = pick(nearer, there_col, col);
-      lanes = hn::Or(lanes, nearer);
-    }
+    V row = field(entries_.foot_row), col = field(entries_.foot_col), named_row, named_col;
+    const V beside = find_beside(p, wanted, row, col), named = find_named(p, wanted, named_row, named_col);
+    const M nearer = hn::Lt(named, beside);
+    row = pick(nearer, named_row, row);
+    col = pick(nearer, named_col, col);
+    const M lanes = hn::And(wanted, hn::Lt(least(named, beside), infinity));
     if (none(lanes)) continue;
     VCell cell;
     M eligible;
@@ -365,12 +369,12 @@ HWY_NOINLINE void Walker::set_out_strays(const EntryList& strays) noexcept {
   }
 }
 
-/// From the other start, for points that are far from the surface that was found.
+/// From where the table of starts says, for points that are far from the surface that was found.
 HWY_NOINLINE void Walker::set_out_again(std::uint32_t begin, std::uint32_t end, EntryList& remote) noexcept {
   const V far = all(part_.far_from(looker_.stride()));
   remote.count = 0;
   for (std::uint32_t i = begin; i < end; i += lane_count()) {
-    constexpr std::int32_t kBoth = kOther | kInside;
+    constexpr std::int32_t kBoth = kAgain | kInside;
     const VI flags = hn::And(hn::LoadU(kDI, entries_.flags + i), all_int(kBoth));
     M is_far = hn::And(as_float(hn::Eq(flags, all_int(kBoth))), hn::FirstN(kD, end - i));
     is_far = hn::And(is_far, hn::Gt(hn::LoadU(kD, entries_.distance + i), far));
@@ -383,11 +387,14 @@ HWY_NOINLINE void Walker::set_out_again(std::uint32_t begin, std::uint32_t end, 
     const VI entry = pick(lanes, hn::LoadU(kDI, remote.entry + i), all_int(kNobody));
     const auto field = [&](const float* values)
                            HWY_ATTR { return hn::IfThenElseZero(lanes, hn::GatherIndex(kD, values, entry)); };
+    const V3 p{field(entries_.x), field(entries_.y), field(entries_.z)};
+    V row, col;
+    const M found =
+        hn::And(lanes, hn::Lt(find_named(p, lanes, row, col), all(std::numeric_limits<float>::infinity())));
     VCell cell;
     M eligible;
-    Walk walk = this->begin({field(entries_.x), field(entries_.y), field(entries_.z)},
-                            field(entries_.other_row), field(entries_.other_col), cell, eligible);
-    const M open = hn::And(lanes, eligible);
+    Walk walk = this->begin(p, row, col, cell, eligible);
+    const M open = hn::And(found, eligible);
     if (!none(open)) go(walk, cell, entry, open);
   }
   go_on();

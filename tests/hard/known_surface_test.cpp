@@ -145,6 +145,28 @@ TEST(Foot, OfABoxLiesOnTheSurfaceButAtEdges) {
   feet_lie_on(box(), {2e-3, 0.01, 5e-3, 3e-3, 0.15}, {"flat, inside", "flat, outside", "crease, outside"});
 }
 
+/// Deep inside, where surfaces on several sides are nearly as near, the distance is that of the nearest but
+/// for few places, from which the search started on another side.
+void depths_are_the_least(const Known& known, double off_share) {
+  Branches branches;
+  check([&] {
+    const Vec3d p = somewhere(known);
+    const Nearest exact = known.nearest(p);
+    RC_PRE(exact.signed_distance_m < -0.05);
+    const Answer answer = known.object.query(cast<float>(p), {Layer::kThree});
+    RC_ASSERT(every_target_agrees(known.object, std::vector<Vec3f>{cast<float>(p)}, {Layer::kThree}));
+    branches.take("deep");
+    if (!(std::abs(static_cast<double>(answer.signed_distance_m) - exact.signed_distance_m) < 0.02))
+      branches.take("off");
+  });
+  branches.expect({"deep"}, 1900);
+  branches.expect_at_most("off", static_cast<int>(off_share * branches.count("deep")));
+  testing::Test::RecordProperty("off", branches.count("off"));
+}
+
+TEST(Depth, OfTwoBallsIsTheLeast) { depths_are_the_least(two_balls(), 0.004); }
+TEST(Depth, OfABoxIsTheLeastButForFewPlaces) { depths_are_the_least(box(), 0.015); }
+
 /// Between two places, the force on a spring of 1 N/m changes by no more than the step, the map's error and
 /// a tenth of itself, but where the answers tell of another part, side or place of the surface.
 void force_changes_slowly(const Known& known, double untold_share) {

@@ -150,11 +150,11 @@ class Object {
   ///
   ///     constant + sum over parts of  record + 520 + ceil(n (b + s) / 8) + [c > 0] (ceil(n / 64) + 6 c)
   ///                                                                      + [v > 0] (ceil(n / 64) + 8 v)
-  ///                                   + 8 t + 36 m^2
+  ///                                   + 2 t + 36 m^2
   ///
   /// and 276 for a tapered part. m cells a side of the part's bounds, 0 without; s = 1 where any texel starts
-  /// inside the mesh, else 0. t tiles of at least 8 x 8 texels, at most 128 a part, each with four starts of
-  /// layer 3. The constant is below 200 bytes and the record at most 256, both fixed by the build.
+  /// inside the mesh, else 0. t boxes of the part's inside, at most 256, each with a start of layer 3. The
+  /// constant is below 200 bytes and the record at most 256, both fixed by the build.
   std::size_t resident_bytes() const noexcept;
 
  private:
