@@ -71,8 +71,11 @@ inline Vec3f direction_of(const Vec3f& v) noexcept {
 /// so that facets which meet in an edge turn a force no faster than the point moves around it. On the rim of
 /// a patch, beyond which the surface goes on, the normal knows better too.
 inline Vec3f outward_at(const Vec3f& out, const Vec3f& normal, float blur, bool on_rim) noexcept {
-  // A normal that looks the other way is that of a patch folded over itself; nearby, the side is in doubt.
-  const bool holds = dot(out, normal) < 0 ? !(dot(out, out) > 4.0F * (blur * blur)) : on_rim;
+  // A normal that looks the other way is that of a patch folded over itself; sideways or nearby, the side is
+  // in doubt.
+  const float up = dot(out, normal), square = dot(out, out);
+  const bool turns = up * up > 0.25F * square && square > 4.0F * (blur * blur);
+  const bool holds = up < 0 ? !turns : on_rim;
   return holds ? normal : normalized(out + blur * normal);
 }
 

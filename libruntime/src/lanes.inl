@@ -68,9 +68,10 @@ HWY_INLINE V3 direction3(const V3& v) {
 }
 /// outward_at() of chart.hpp.
 HWY_INLINE V3 outward3(const V3& out, const V3& normal, float blur, M on_rim) {
-  const M back = hn::Lt(dot3(out, normal), hn::Zero(kD)),
-          far = hn::Gt(dot3(out, out), all(4.0F * (blur * blur)));
-  const M holds = hn::Or(hn::AndNot(far, back), hn::AndNot(back, on_rim));
+  const V up = dot3(out, normal), square = dot3(out, out);
+  const M back = hn::Lt(up, hn::Zero(kD));
+  const M turns = hn::And(hn::Gt(up * up, all(0.25F) * square), hn::Gt(square, all(4.0F * (blur * blur))));
+  const M holds = hn::Or(hn::AndNot(turns, back), hn::AndNot(back, on_rim));
   return pick(holds, normal, normalized3(out + all(blur) * normal));
 }
 HWY_INLINE V3 rotated(const Rotation<float>& r, const V3& v) {

@@ -145,7 +145,7 @@ std::vector<Shape> make_shapes() {
                   {{0.1, 0, 0.95}, -0.05, {0, 0, 1}},
                   {{0, 0.2, -0.9}, -0.1, {0, 0, -1}}},
        .shares_2 = {0, 0.05, 0.07},
-       .shares_3 = {0, 0.03, 0.05}});
+       .shares_3 = {0, 0.008, 0.02}});
   shapes.push_back(
       {.name = "cone",
        .mesh = test::cone(0.5, 1, 96),
@@ -174,6 +174,7 @@ std::vector<Shape> make_shapes() {
   tapered.most_union = 1.2;
   tapered.layer_2 = tapered.layer_3;
   tapered.shares_2 = {0.004, 0.08, 0.06};
+  tapered.shares_3.askew = 0.019;
   shapes.push_back(tapered);
   shapes.push_back(
       {.name = "l_shape",
@@ -196,7 +197,7 @@ std::vector<Shape> make_shapes() {
                   {{1.2, 0.46, 0}, -0.04, {0, 1, 0}},
                   {{0.46, 1.3, 0}, -0.04, {1, 0, 0}}},
        .shares_2 = {0.004, 0.03, 0.045},
-       .shares_3 = {0.004, 0.025, 0.045}});
+       .shares_3 = {0.004, 0.007, 0.025}});
   shapes.push_back(
       {.name = "torus",
        .mesh = test::torus(1, 0.3, 64, 32),
@@ -216,7 +217,7 @@ std::vector<Shape> make_shapes() {
        .layer_2 = {0.015, 20 * kDegree},
        .layer_3 = {0.01, 10 * kDegree},
        .shares_2 = {0.002, 0.14, 0.09},
-       .shares_3 = {0.002, 0.005, 0.025}});
+       .shares_3 = {0.002, 0.005, 0.008}});
   shapes.push_back(
       {.name = "spring",
        .mesh = test::spring(kCoil_m, kWire_m, kPitch_m, kTurns, 40, 32),
@@ -235,7 +236,7 @@ std::vector<Shape> make_shapes() {
        .layer_2 = {0.03, 45 * kDegree},
        .layer_3 = {0.0015, 15 * kDegree},
        .shares_2 = {0.002, 0.16, 0.22},
-       .shares_3 = {0, 0.002, 0.025}});
+       .shares_3 = {0, 0.002, 0.008}});
   shapes.push_back({.name = "thin_sheet",
                     .mesh = test::thin_sheet(1, 0.02),
                     .depth_m =
@@ -310,7 +311,7 @@ std::vector<Shape> make_shapes() {
                   {{0.5, 0.1, -0.46}, -0.04, {0, 0, -1}},
                   {{-0.96, 0.2, 0.1}, -0.04, {-1, 0, 0}}},
        .shares_2 = {0, 0.015, 0.03},
-       .shares_3 = {0, 0.003, 0.015}});
+       .shares_3 = {0, 0.001, 0.01}});
   return shapes;
 }
 
