@@ -46,8 +46,8 @@ class Places {
       const SurfaceSample<double> r = table_.sample(row, col);
       const double above_m = 0.1 * unit(rng_) - 0.05;
       const Vec3d p = r.point_m - (crossing_m(r.point_m, r.normal) - above_m) * r.normal;
-      const auto near_row = static_cast<std::uint32_t>(row + 0.5),
-                 near_col = static_cast<std::uint32_t>(col + 0.5) % kCols;
+      const auto near_row = static_cast<std::uint32_t>(std::lround(row)),
+                 near_col = static_cast<std::uint32_t>(std::lround(col)) % kCols;
       const Vec3d node = grid_.point(near_row, near_col), n = grid_.normal(near_row, near_col);
       const Vec3d hit = node - crossing_m(node, n) * n;
       places.push_back({name_of(row, col), cast<float>(p), above_m, norm(p - kBall.centre_m) - kBall.radius_m,
