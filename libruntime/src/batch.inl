@@ -292,7 +292,10 @@ HWY_NOINLINE void Answerer::place(const EntryRange& range) noexcept {
     if (wants_.normal && !none(nearest)) {
       const V3 p = load3(entries_.x, entries_.y, entries_.z, i);
       const V3 out = pick(has(kInside), surface - p, p - surface);
-      const M on_rim = hn::AndNot(has(kFaces), refined);
+      const V row = hn::LoadU(kD, entries_.row + i);
+      const float near = kShortOfPole * looker.size();
+      const M beside_pole = hn::Or(hn::Lt(row, all(near)), hn::Gt(row, all(looker.last_row() - near)));
+      const M on_rim = hn::And(refined, hn::Or(hn::Not(has(kFaces)), beside_pole));
       normal = pick(nearest, outward3(out, normal, blur, on_rim), normal);
     }
     if (wants_.surface)

@@ -41,6 +41,8 @@ struct ChartAnswer {
 inline constexpr float kLeastDoubt = 1e-6F;  ///< of the part's sphere
 inline constexpr float kBesidePole =
     0.05F;  ///< cells: on a pole the columns have no length, and no direction
+/// Cells: so near a pole the search of layer 3 may stop short of the nearest place.
+inline constexpr float kShortOfPole = 0.25F;
 inline constexpr int kThirdLayerSteps =
     8;  ///< Gauss-Newton converges in one or two; the rest crosses cells and creases
 inline constexpr float kMostCells = 2;     ///< of one such step
@@ -69,7 +71,8 @@ inline Vec3f direction_of(const Vec3f& v) noexcept {
 ///     n ~ out + blur normal,
 ///
 /// so that facets which meet in an edge turn a force no faster than the point moves around it. On the rim of
-/// a patch, beyond which the surface goes on, the normal knows better too.
+/// a patch, beyond which the surface goes on, the normal knows better too, and beside a pole,
+/// where the search may stop short.
 inline Vec3f outward_at(const Vec3f& out, const Vec3f& normal, float blur, bool on_rim) noexcept {
   // A normal that looks the other way is that of a patch folded over itself; sideways or nearby, the side is
   // in doubt.
@@ -288,7 +291,9 @@ inline ChartAnswer Chart::look(const Vec3f& p, bool third, std::uint32_t level, 
   if (answer.refined) answer.normal = direction_of(answer.normal);
   if (answer.refined || (third && !answer.bounds_patch)) {
     const Vec3f out = answer.inside ? answer.surface - p : p - answer.surface;
-    const bool on_rim = answer.refined && !answer.faces_patch;
+    const float near = kShortOfPole * static_cast<float>(stride), last = static_cast<float>(part_.rows - 1);
+    const bool beside_pole = answer.row < near || answer.row > last - near;
+    const bool on_rim = answer.refined && (!answer.faces_patch || beside_pole);
     answer.normal = outward_at(out, answer.normal, part_.blur(stride), on_rim);
   }
   if (edge > 0 && std::isfinite(answer.distance)) answer.offset = offset(answer.row, answer.col, level, edge);

@@ -109,10 +109,7 @@ void expect_like_everywhere(const Place& at, Layer layer, bool inside, double di
   if (std::abs(at.exact_m) > 5e-4) {
     EXPECT_EQ(inside, at.exact_m < 0);
   }
-  // Beside a pole the search of layer 3 may stop a little short.
-  const bool beside_pole = at.name == "first row" || at.name == "last row";
-  EXPECT_GT(dot(normal, normalized(cast<double>(at.p) - kBall.centre_m)),
-            layer == Layer::kThree && beside_pole ? 0.99 : 0.998);
+  EXPECT_GT(dot(normal, normalized(cast<double>(at.p) - kBall.centre_m)), 0.998);
 }
 
 TEST(MapEdges, WrapAndPolesTellTheDistanceToABallLikeTheRest) {
