@@ -48,7 +48,9 @@ struct Answer {
   /// places inside the mesh, where neither the ray from above nor a search beside it meets a surface.
   float signed_distance_m = std::numeric_limits<float>::quiet_NaN();
   /// Outward unit vector; zero where unknown. In layer 3 the direction in which the distance grows, from
-  /// surface_m to the point or back; near the surface, and in the other layers, the surface's normal.
+  /// surface_m to the point or back; near the surface, on the rims of charts, and in the other layers, the
+  /// surface's normal. Between neighbouring points a force turns faster than they move only where `part`,
+  /// `inside` or surface_m changes, or where the normal is not that direction.
   Vec3f normal;
   Vec3f surface_m;  ///< the point of the surface that signed_distance_m speaks of; zero where unknown
   std::uint32_t part = kNowhere;  ///< part that answered; kNowhere: outside every superquadric
