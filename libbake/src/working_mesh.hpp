@@ -15,9 +15,10 @@ struct WorkingMesh {
   std::vector<std::vector<std::uint32_t>> faces_of_input;  ///< working faces each input face became part of
 };
 
-/// Splits edges longer than `longest_edge`, then collapses edges shorter than `shortest_edge` to their
-/// midpoints where that neither changes the topology nor flips a face. Works on any triangles; non-manifold
-/// edges are left alone.
+/// First moves vertices that carry no shape, as where faces were cut into coplanar ones, into a neighbour,
+/// so that how a surface was cut matters little. Then splits edges longer than `longest_edge`, then collapses
+/// edges shorter than `shortest_edge` to their midpoints where that neither changes the topology nor flips a
+/// face. Works on any triangles; non-manifold edges are left alone.
 WorkingMesh make_working_mesh(const Triangles& input, double shortest_edge, double longest_edge);
 
 }  // namespace sqmap::bake

@@ -377,6 +377,15 @@ TEST(DecomposeElephant, FollowsARotation) {
   EXPECT_LT(rand_error(mesh, segments(mesh).label, moved.label), 0.02);
 }
 
+TEST(DecomposeElephant, FollowsFacesThatAreCutInFour) {
+  const Mesh mesh = real_mesh("elephant.off"), fine = test::subdivided(mesh);
+  const Decomposition expected = segments(mesh), cut = segments(fine);
+  std::vector<std::uint32_t> inherited(fine.faces.size());
+  for (std::size_t f = 0; f < inherited.size(); ++f) inherited[f] = expected.label[fine.source_face[f]];
+  EXPECT_EQ(cut.reasons, expected.reasons);
+  EXPECT_LT(rand_error(fine, inherited, cut.label), 0.002);
+}
+
 #endif
 
 }  // namespace

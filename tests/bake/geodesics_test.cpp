@@ -255,5 +255,53 @@ TEST(WorkingMesh, HasEvenEdgesAndTheSameTopology) {
   }
 }
 
+// Edges are neither too long nor too short here: what changes are vertices that carry no shape.
+WorkingMesh without_plain_vertices(const Mesh& mesh) { return make_working_mesh(triangles(mesh), 1e-9, 1e3); }
+
+TEST(WorkingMesh, ForgetsThatFacesWereCut) {
+  Mesh inputs[] = {test::sphere(1, 3), test::torus(1, 0.4, 24, 12), test::spring(1, 0.2, 0.8, 2, 48, 16)};
+  for (Mesh& input : inputs) {
+    for (Vec3d& p : input.vertices_m)  // so that no two faces lie in one plane
+      p = p + 0.03 * Vec3d{std::sin(9 * p.y), std::sin(7 * p.z), std::sin(11 * p.x)};
+    const WorkingMesh whole = without_plain_vertices(input);
+    EXPECT_EQ(whole.triangles.faces.size(), input.faces.size());
+    Mesh cut = test::subdivided(input);
+    const WorkingMesh found = without_plain_vertices(cut);
+    EXPECT_EQ(found.triangles.faces, whole.triangles.faces);
+    EXPECT_EQ(found.triangles.points, whole.triangles.points);
+    for (std::size_t f = 0; f < cut.faces.size(); ++f)
+      ASSERT_EQ(found.faces_of_input[f], whole.faces_of_input[cut.source_face[f]]);
+
+    // Rounded, the same but for the order of vertices that are as far from the middle.
+    for (Vec3d& p : cut.vertices_m) p = cast<double>(cast<float>(p));
+    const WorkingMesh rounded = without_plain_vertices(cut);
+    EXPECT_EQ(rounded.triangles.faces.size(), input.faces.size());
+    for (std::size_t f = 0; f < cut.faces.size(); ++f) {
+      ASSERT_EQ(rounded.faces_of_input[f].size(), 1U);
+      const auto& face = rounded.triangles.faces[rounded.faces_of_input[f][0]];
+      const auto& parent = input.faces[cut.source_face[f]];
+      Vec3d off;
+      for (int i = 0; i < 3; ++i) off = off + rounded.triangles.points[face[i]] - input.vertices_m[parent[i]];
+      ASSERT_LT(norm(off), 1e-5);
+    }
+  }
+}
+
+TEST(WorkingMesh, IsAsFlatAsTheSurface) {
+  Mesh box = test::box({1, 1, 3});
+  for (int time = 0; time < 4; ++time) box = test::subdivided(box);
+  const WorkingMesh working = without_plain_vertices(box);
+  EXPECT_EQ(working.triangles.faces.size(), 12U);
+  const Surface surface = make_surface(working.triangles);
+  EXPECT_NEAR(surface.scale_m * surface.scale_m, 2 * (4 + 12 + 12), 1e-9);
+  for (std::size_t f = 0; f < box.faces.size(); ++f) {
+    ASSERT_EQ(working.faces_of_input[f].size(), 1U);
+    const auto& [a, b, c] = box.faces[f];
+    const Vec3d n =
+        normalized(cross(box.vertices_m[b] - box.vertices_m[a], box.vertices_m[c] - box.vertices_m[a]));
+    EXPECT_GT(dot(n, surface.normal[working.faces_of_input[f][0]]), 0.999);
+  }
+}
+
 }  // namespace
 }  // namespace sqmap::bake
