@@ -74,10 +74,12 @@ std::vector<Probe> probe(const Asset& asset, const ShellPoints& shell, const Mes
     const Part& part = asset.parts[k];
     const ShapeTable<double> table(part.shape, part.map.rows, part.map.cols);
     const Rotation<double> turn = rotation(part.object_from_part.orientation);
+    const Vec3d half_m = half_extents_m(part.shape);
     std::vector<RayTracer::Hit> hits;
     for (const Vec3f& point : shell.points_m) {
       const Vec3d m = turn.apply_inverse(cast<double>(point) - part.object_from_part.translation_m);
-      if (!(inside_outside_radial(part.shape, m) <= 1)) continue;
+      const bool in_box = std::abs(m.x) <= half_m.x && std::abs(m.y) <= half_m.y && std::abs(m.z) <= half_m.z;
+      if (!in_box || !(inside_outside_radial(part.shape, m) <= 1)) continue;
       const Foot<double> foot = table.foot(m);
       const SurfaceSample<double> r = table.sample(foot.row, foot.col);
       queries.rays.trace(turn.apply(r.point_m) + part.object_from_part.translation_m, turn.apply(-r.normal),
