@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <numeric>
 #include <sstream>
 
 #include <tbb/parallel_for.h>
@@ -43,6 +44,9 @@ constexpr int kMapRounds = 5;
 constexpr double kMostStricter = 0.4, kLeastStricter = 0.97;
 constexpr double kWorthFinerMaps = 0.2;
 constexpr double kNearTarget = 1.1;
+// Parts are given coarser maps back up to this share of the aims: chosen by the points that judge it, they
+// do a little worse at others.
+constexpr double kGivenBack = 0.93;
 constexpr double kWrongSides = 10.5;
 // Parts take whole triangles. So that long ones do not tie together what should be cut, edges are halved down
 // to this share of R_max first, as far as the number of added triangles allows.
@@ -208,10 +212,53 @@ std::vector<std::uint16_t> label_input_faces(const std::vector<std::uint16_t>& o
 }
 
 struct Drawn {
-  double depth_in_aims;  ///< mean error of depth near the surface over what it may be
+  double depth_in_aims;  ///< Shortfall::depth
   bool by_budget;        ///< the byte budget decided
   std::size_t bytes;     ///< of the object in memory
 };
+
+/// Errors of an asset, near the surface, over what its target allows: at most 1 where they meet it.
+struct Shortfall {
+  double depth{}, sides{};
+  std::size_t bytes{};  ///< of the object in memory
+  double worse() const { return std::max(depth, sides); }
+};
+
+Result<Shortfall> judge(const Asset& asset, const ShellPoints& shell, double target_m) {
+  auto object = runtime::Object::build(asset);
+  if (!object) return object.error();
+  const ShellError error = shell_error(object.value(), shell);
+  return Shortfall{error.depth_mean_m / (kNearTarget * target_m),
+                   error.misclassified * asset.r_max_m / (kWrongSides * target_m),
+                   object.value().resident_bytes()};
+}
+
+/// Gives parts back the maps they had in `first`, those first that save most, as long as the errors stay
+/// where they may be: not every part errs less with a finer map.
+Result<Shortfall> give_back(Asset& asset, Shortfall now, const std::vector<Part>& first,
+                            const ShellPoints& shell, double target_m) {
+  const auto bits = [](const Part& part) { return 1.0 * part.map.rows * part.map.cols * part.map.bits; };
+  const auto saved = [&](std::size_t k) { return bits(asset.parts[k]) - bits(first[k]); };
+  std::vector<std::size_t> order(first.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::stable_sort(order.begin(), order.end(),
+                   [&](std::size_t i, std::size_t k) { return saved(i) > saved(k); });
+  for (const std::size_t k : order) {
+    if (!(saved(k) > 0)) break;
+    Part kept = std::move(asset.parts[k]);
+    asset.parts[k] = first[k];
+    asset.sphere = enclosing_sphere(asset.parts);
+    auto without = judge(asset, shell, target_m);
+    if (!without) return without;
+    if (without.value().worse() <= std::max(kGivenBack, now.worse())) {
+      now = without.value();
+    } else {
+      asset.parts[k] = std::move(kept);
+    }
+  }
+  asset.sphere = enclosing_sphere(asset.parts);
+  return now;
+}
 
 /// The maps that the target asks for. What they lose beside seams, where one chart ends and the next has not
 /// begun, shows only between parts: as long as the error of the whole exceeds the target, and finer maps
@@ -219,10 +266,9 @@ struct Drawn {
 Result<Drawn> draw_maps(Asset& asset, MapDrawer& drawer, std::size_t most_shapes, const MeshQueries& queries,
                         const MapTarget& target, std::uint64_t seed) {
   const ShellPoints shell = sample_shell(queries, kShellWidth * asset.r_max_m, kShellPoints, seed);
-  std::vector<Part> best;
-  double depth_in_aims = 0, sides_in_aims = 0;
+  std::vector<Part> first, best;
+  Shortfall least;
   bool by_budget = false;
-  std::size_t bytes = 0;
   MapTarget asked = target;
   double share = 1;  // of the target before
   for (int round = 0; round < kMapRounds; ++round) {
@@ -231,29 +277,26 @@ Result<Drawn> draw_maps(Asset& asset, MapDrawer& drawer, std::size_t most_shapes
     tbb::parallel_for(std::size_t{0}, asset.parts.size(), [&](std::size_t k) {
       add_vertex_samples(asset.parts[k], queries, kVertexTolerance * target.error_m);
     });
-    auto object = runtime::Object::build(asset);
-    if (!object) return object.error();
-    const ShellError error = shell_error(object.value(), shell);
-    const double depth = error.depth_mean_m / (kNearTarget * target.error_m);
-    const double sides = error.misclassified * asset.r_max_m / (kWrongSides * target.error_m);
-    const auto gains = [share](double now, double before) {
-      return before > 1 && now <= (1 - kWorthFinerMaps * (1 - share)) * before;
+    const auto judged = judge(asset, shell, target.error_m);
+    if (!judged) return judged.error();
+    const Shortfall& now = judged.value();
+    if (round == 0) first = asset.parts;
+    const auto gains = [share](double here, double before) {
+      return before > 1 && here <= (1 - kWorthFinerMaps * (1 - share)) * before;
     };
-    if (round > 0 && !gains(depth, depth_in_aims) && !gains(sides, sides_in_aims)) break;
-    depth_in_aims = depth;
-    sides_in_aims = sides;
+    if (round > 0 && !gains(now.depth, least.depth) && !gains(now.sides, least.sides)) break;
+    least = now;
     best = asset.parts;
     by_budget = budget_decided;
-    bytes = object.value().resident_bytes();
-    const double worse = std::max(depth, sides);
-    if (by_budget || worse <= 1) break;
-    share =
-        std::max(kMostStricter, kLeastStricter / std::sqrt(worse));  // errors fall faster than their target
+    if (by_budget || now.worse() <= 1) break;
+    share = std::max(kMostStricter,
+                     kLeastStricter / std::sqrt(now.worse()));  // errors fall faster than their target
     asked.error_m *= share;
   }
   asset.parts = std::move(best);
-  asset.sphere = enclosing_sphere(asset.parts);
-  return Drawn{depth_in_aims, by_budget, bytes};
+  auto given = give_back(asset, least, first, shell, target.error_m);
+  if (!given) return given.error();
+  return Drawn{given.value().depth, by_budget, given.value().bytes};
 }
 
 /// The asset with the superquadrics that its partition was judged by. The full fits are smaller, but one in
