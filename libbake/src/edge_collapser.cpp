@@ -2,7 +2,6 @@
 #include "edge_collapser.hpp"
 
 #include <algorithm>
-#include <iterator>
 
 namespace sqmap::bake {
 
@@ -35,26 +34,44 @@ void EdgeCollapser::neighbours(std::uint32_t v, std::vector<std::uint32_t>& list
   std::sort(list.begin(), list.end());
 }
 
-// Link condition: the two vertices share exactly the neighbours that lie opposite in their two common
-// faces, each vertex lies inside one closed fan, and no remaining face turns over.
+EdgeCollapser::Fan EdgeCollapser::unite(std::vector<std::uint32_t>& neighbours) {
+  std::size_t kept = 0, on_rim = 0;
+  for (std::size_t begin = 0, end = 0; begin < neighbours.size(); begin = end) {  // sorted
+    while (end < neighbours.size() && neighbours[end] == neighbours[begin]) ++end;
+    if (end - begin > 2) return Fan::kNone;
+    on_rim += end - begin == 1;
+    neighbours[kept++] = neighbours[begin];
+  }
+  neighbours.resize(kept);
+  return on_rim == 0 ? Fan::kClosed : on_rim == 2 ? Fan::kOnRim : Fan::kNone;
+}
+
+// Link condition: the two vertices share exactly the neighbours that lie opposite in their common faces, each
+// vertex lies inside one fan, and no remaining face turns over.
 bool EdgeCollapser::may_collapse(std::uint32_t a, std::uint32_t b, const Vec3d& target,
                                  std::size_t least_edges) {
   neighbours(a, ring_a_);
   neighbours(b, ring_b_);
-  const auto is_closed_fan = [](const std::vector<std::uint32_t>& ring) {
-    for (std::size_t i = 0; i < ring.size(); i += 2)  // sorted: each neighbour twice
-      if (i + 1 == ring.size() || ring[i] != ring[i + 1] || (i + 2 < ring.size() && ring[i + 2] == ring[i]))
-        return false;
-    return true;
-  };
-  if (!is_closed_fan(ring_a_) || !is_closed_fan(ring_b_)) return false;
-  ring_a_.erase(std::unique(ring_a_.begin(), ring_a_.end()), ring_a_.end());
-  ring_b_.erase(std::unique(ring_b_.begin(), ring_b_.end()), ring_b_.end());
-  common_.clear();
-  std::set_intersection(ring_a_.begin(), ring_a_.end(), ring_b_.begin(), ring_b_.end(),
-                        std::back_inserter(common_));
-  if (common_.size() != 2 || ring_a_.size() + ring_b_.size() < 4 + least_edges) return false;
+  if (unite(ring_a_) != Fan::kClosed || unite(ring_b_) != Fan::kClosed) return false;
+  if (common() != 2 || ring_a_.size() + ring_b_.size() < 4 + least_edges) return false;
   return !flips(a, b, target) && !flips(b, a, target);
+}
+
+bool EdgeCollapser::may_move(std::uint32_t gone, std::uint32_t keep) {
+  neighbours(gone, ring_a_);
+  neighbours(keep, ring_b_);
+  const auto common_faces = static_cast<std::size_t>(std::count(ring_a_.begin(), ring_a_.end(), keep));
+  const Fan fan = unite(ring_a_), other = unite(ring_b_);
+  if (fan == Fan::kNone || other == Fan::kNone) return false;
+  if (common_faces != (fan == Fan::kClosed ? 2 : 1) || common() != common_faces) return false;
+  const bool is_tetrahedron = other == Fan::kClosed && ring_a_.size() + ring_b_.size() < 7;
+  return !is_tetrahedron && !flips(gone, keep, mesh_.points[keep]);
+}
+
+std::size_t EdgeCollapser::common() const {
+  std::size_t count = 0;
+  for (const std::uint32_t v : ring_a_) count += std::binary_search(ring_b_.begin(), ring_b_.end(), v);
+  return count;
 }
 
 bool EdgeCollapser::flips(std::uint32_t moved, std::uint32_t other, const Vec3d& target) const {

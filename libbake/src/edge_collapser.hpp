@@ -17,6 +17,9 @@ class EdgeCollapser {
 
   /// Whether `gone` may be moved into `keep`, and both to `target`, and have `least_edges` >= 3 then.
   bool may_collapse(std::uint32_t keep, std::uint32_t gone, const Vec3d& target, std::size_t least_edges);
+  /// Whether `gone` may be moved into `keep`, which stays where it is. On the rim of the surface only along
+  /// the rim.
+  bool may_move(std::uint32_t gone, std::uint32_t keep);
   void collapse(std::uint32_t keep, std::uint32_t gone, const Vec3d& target);
 
   /// The vertex that v has become part of.
@@ -26,14 +29,19 @@ class EdgeCollapser {
   const std::vector<std::uint32_t>& faces_around(std::uint32_t v) const { return fan_[v]; }
 
  private:
+  enum class Fan { kClosed, kOnRim, kNone };
+  /// How the faces around a vertex lie whose neighbours, one entry a face, are these; one entry each then.
+  static Fan unite(std::vector<std::uint32_t>& neighbours);
   void neighbours(std::uint32_t v, std::vector<std::uint32_t>& list) const;
+  /// Of ring_a_ and ring_b_.
+  std::size_t common() const;
   bool flips(std::uint32_t moved, std::uint32_t other, const Vec3d& target) const;
 
   Triangles& mesh_;
   std::vector<std::uint32_t> into_;
   std::vector<std::uint8_t> alive_;
   std::vector<std::vector<std::uint32_t>> fan_;
-  std::vector<std::uint32_t> ring_a_, ring_b_, common_;
+  std::vector<std::uint32_t> ring_a_, ring_b_;
 };
 
 }  // namespace sqmap::bake

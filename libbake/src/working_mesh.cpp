@@ -108,8 +108,11 @@ class PlainVertices {
       normals_.push_back(
           normalized(cross(mesh_.points[b] - mesh_.points[a], mesh_.points[c] - mesh_.points[a])));
       for (const std::uint32_t w : mesh_.faces[f])
-        if (w != v && std::find(ring_.begin(), ring_.end(), w) == ring_.end()) ring_.push_back(w);
+        if (w != v) ring_.push_back(w);
     }
+    std::sort(ring_.begin(), ring_.end());
+    keep_ends_of_straight_rim(v);
+    ring_.erase(std::unique(ring_.begin(), ring_.end()), ring_.end());
     const auto lies_in_all_planes = [&](std::uint32_t u) {
       const Vec3d way = mesh_.points[u] - mesh_.points[v];
       const double most = slope_ * norm(way);
@@ -122,8 +125,19 @@ class PlainVertices {
       return std::pair(distance(a), a) < std::pair(distance(b), b);
     });
     for (const std::uint32_t u : ring_)
-      if (has_room(v, u) && collapser_.may_collapse(u, v, mesh_.points[u], 3)) return u;
+      if (has_room(v, u) && collapser_.may_move(v, u)) return u;
     return std::nullopt;
+  }
+  /// Of ring_, if v lies on a rim: those who do, one face each, where the rim is straight; else none.
+  void keep_ends_of_straight_rim(std::uint32_t v) {
+    std::vector<std::uint32_t> ends;
+    for (const std::uint32_t w : ring_)
+      if (std::count(ring_.begin(), ring_.end(), w) == 1) ends.push_back(w);
+    if (ends.empty()) return;
+    ring_.clear();
+    if (ends.size() != 2) return;
+    const Vec3d a = mesh_.points[ends[0]] - mesh_.points[v], b = mesh_.points[ends[1]] - mesh_.points[v];
+    if (dot(a, b) < 0 && norm(cross(a, b)) <= slope_ * norm(a) * norm(b)) ring_ = ends;
   }
   bool has_room(std::uint32_t v, std::uint32_t into) const {
     return collapser_.faces_around(v).size() + collapser_.faces_around(into).size() <= kMostNeighbours + 4;
@@ -142,25 +156,27 @@ struct Collapsed {
   std::vector<std::uint32_t> face_of_face;  ///< that each face was or became part of
 };
 
-/// The one of `candidates`, faces of `triangles`, that is nearest to p.
+Vec3d centroid(const Triangles& triangles, std::uint32_t face) {
+  const auto& [a, b, c] = triangles.faces[face];
+  return (1.0 / 3.0) * (triangles.points[a] + triangles.points[b] + triangles.points[c]);
+}
+
+/// The one of `candidates`, faces of `triangles`, that is nearest to p. Where p is nearest to an edge they
+/// share, to both alike, their centroids decide.
 std::uint32_t nearest_face(const Vec3d& p, const Triangles& triangles,
                            std::span<const std::uint32_t> candidates) {
+  constexpr double kCentroidShare = 0.01;
   std::uint32_t best = candidates.front();
   double least = std::numeric_limits<double>::infinity();
   for (const std::uint32_t f : candidates) {
     const auto& [a, b, c] = triangles.faces[f];
-    const Vec3d d =
-        nearest_of_triangle(p, {triangles.points[a], triangles.points[b], triangles.points[c]}) - p;
-    if (!(dot(d, d) < least)) continue;
-    least = dot(d, d);
+    const Vec3d q = nearest_of_triangle(p, {triangles.points[a], triangles.points[b], triangles.points[c]});
+    const double distance = norm(q - p) + kCentroidShare * norm(centroid(triangles, f) - p);
+    if (!(distance < least)) continue;
+    least = distance;
     best = f;
   }
   return best;
-}
-
-Vec3d centroid(const Triangles& triangles, std::uint32_t face) {
-  const auto& [a, b, c] = triangles.faces[face];
-  return (1.0 / 3.0) * (triangles.points[a] + triangles.points[b] + triangles.points[c]);
 }
 
 Collapsed compacted(const Triangles& before, const Triangles& after, EdgeCollapser& collapser) {

@@ -259,7 +259,11 @@ TEST(WorkingMesh, HasEvenEdgesAndTheSameTopology) {
 WorkingMesh without_plain_vertices(const Mesh& mesh) { return make_working_mesh(triangles(mesh), 1e-9, 1e3); }
 
 TEST(WorkingMesh, ForgetsThatFacesWereCut) {
-  Mesh inputs[] = {test::sphere(1, 3), test::torus(1, 0.4, 24, 12), test::spring(1, 0.2, 0.8, 2, 48, 16)};
+  Mesh inputs[] = {test::sphere(1, 3), test::torus(1, 0.4, 24, 12), test::spring(1, 0.2, 0.8, 2, 48, 16),
+                   test::sphere(1, 3)};
+  Mesh& cap = inputs[3];
+  std::erase_if(cap.faces, [&](const auto& face) { return cap.vertices_m[face[0]].z < 0.3; });
+  test::number_faces(cap);
   for (Mesh& input : inputs) {
     for (Vec3d& p : input.vertices_m)  // so that no two faces lie in one plane
       p = p + 0.03 * Vec3d{std::sin(9 * p.y), std::sin(7 * p.z), std::sin(11 * p.x)};
