@@ -47,6 +47,8 @@ constexpr double kNearTarget = 1.1;
 // Parts are given coarser maps back up to this share of the aims: chosen by the points that judge it, they
 // do a little worse at others.
 constexpr double kGivenBack = 0.93;
+// Less than this share of all texels is not worth the question.
+constexpr double kLeastGivenBack = 0.003;
 constexpr double kWrongSides = 10.5;
 // Parts take whole triangles. So that long ones do not tie together what should be cut, edges are halved down
 // to this share of R_max first, as far as the number of added triangles allows.
@@ -233,25 +235,29 @@ Result<Shortfall> judge(const Asset& asset, const ShellPoints& shell, double tar
                    object.value().resident_bytes()};
 }
 
-/// Gives parts back the maps they had in `first`, those first that save most, as long as the errors stay
-/// where they may be: not every part errs less with a finer map.
+/// Gives parts back the maps they had in `first`, those first that save most, as long as neither error rises
+/// beyond kGivenBack of what it may be, or where it is: not every part errs less with a finer map.
 Result<Shortfall> give_back(Asset& asset, Shortfall now, const std::vector<Part>& first,
                             const ShellPoints& shell, double target_m) {
   const auto bits = [](const Part& part) { return 1.0 * part.map.rows * part.map.cols * part.map.bits; };
   const auto saved = [&](std::size_t k) { return bits(asset.parts[k]) - bits(first[k]); };
+  double all_bits = 0;
+  for (const Part& part : asset.parts) all_bits += bits(part);
   std::vector<std::size_t> order(first.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
   std::stable_sort(order.begin(), order.end(),
                    [&](std::size_t i, std::size_t k) { return saved(i) > saved(k); });
   for (const std::size_t k : order) {
-    if (!(saved(k) > 0)) break;
+    if (!(saved(k) > kLeastGivenBack * all_bits)) break;
     Part kept = std::move(asset.parts[k]);
     asset.parts[k] = first[k];
     asset.sphere = enclosing_sphere(asset.parts);
     auto without = judge(asset, shell, target_m);
     if (!without) return without;
-    if (without.value().worse() <= std::max(kGivenBack, now.worse())) {
-      now = without.value();
+    const Shortfall& then = without.value();
+    if (then.depth <= std::max(kGivenBack, now.depth) && then.sides <= std::max(kGivenBack, now.sides) &&
+        then.bytes < now.bytes) {
+      now = then;
     } else {
       asset.parts[k] = std::move(kept);
     }
@@ -294,6 +300,8 @@ Result<Drawn> draw_maps(Asset& asset, MapDrawer& drawer, std::size_t most_shapes
     asked.error_m *= share;
   }
   asset.parts = std::move(best);
+  asset.sphere = enclosing_sphere(asset.parts);
+  if (by_budget) return Drawn{least.depth, by_budget, least.bytes};
   auto given = give_back(asset, least, first, shell, target.error_m);
   if (!given) return given.error();
   return Drawn{given.value().depth, by_budget, given.value().bytes};
