@@ -176,13 +176,14 @@ bool is_gradient(const Answer& answer, const Vec3d& p) {
   return norm(depth_m * cast<double>(answer.normal) - out) < 0.05 * depth_m + 2e-4;
 }
 
-/// Between two places, the force on a spring of 1 N/m changes by no more than the step, the map's error and
-/// a tenth of itself, but where the answers tell of another part, side or place of the surface, or that a
-/// normal is not the gradient of the distance.
 struct ForceLimits {
   double place, normal;  ///< jumps at a new place and at a normal that is no gradient, as shares of the steps
   double nothing;        ///< jumps that no answer tells
 };
+
+/// Between two places, the force on a spring of 1 N/m changes by no more than the step, the map's error and
+/// a tenth of itself, but where the answers tell of another part, side or place of the surface, or that a
+/// normal is not the gradient of the distance.
 void force_changes_slowly(const Known& known, const ForceLimits& limits) {
   Branches branches;
   constexpr double kStep_m = 1e-3, kMapError_m = 1e-3, kTurn = 0.1, kSamePlace_m = 2 * kStep_m;
@@ -241,7 +242,7 @@ TEST(Force, OverABoxJumpsOnlyWhereTheAnswersSaySo) {
   force_changes_slowly(box(), {.place = 0.003, .normal = 0.0001, .nothing = 0});
 }
 // Its vertex samples are random, so its facets do not meet.
-TEST(Force, OverAMixedAssetJumpsOnlyWhereTheAnswersSaySo) {
+TEST(Force, OverAMixedAssetJumpsSeldomButWhereTheAnswersSaySo) {
   force_changes_slowly(mixed(), {.place = 0.012, .normal = 0.005, .nothing = 1e-4});
 }
 

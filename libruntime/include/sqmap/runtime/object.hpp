@@ -49,8 +49,8 @@ struct Answer {
   float signed_distance_m = std::numeric_limits<float>::quiet_NaN();
   /// Outward unit vector; zero where unknown. In layer 3 the direction in which the distance grows, from
   /// surface_m to the point or back; near the surface, on the rims of charts, and in the other layers, the
-  /// surface's normal. Between neighbouring points a force turns faster than they move only where `part`,
-  /// `inside` or surface_m changes, or where the normal is not that direction.
+  /// surface's normal. Between neighbouring points a force turns faster than they move where `part` or
+  /// `inside` changes, surface_m leaps, or the normal is not that direction; hardly ever elsewhere.
   Vec3f normal;
   Vec3f surface_m;  ///< the point of the surface that signed_distance_m speaks of; zero where unknown
   std::uint32_t part = kNowhere;  ///< part that answered; kNowhere: outside every superquadric
