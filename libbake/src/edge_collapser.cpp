@@ -46,8 +46,8 @@ EdgeCollapser::Fan EdgeCollapser::unite(std::vector<std::uint32_t>& neighbours) 
   return on_rim == 0 ? Fan::kClosed : on_rim == 2 ? Fan::kOnRim : Fan::kNone;
 }
 
-// Link condition: the two vertices share exactly the neighbours that lie opposite in their common faces, each
-// vertex lies inside one fan, and no remaining face turns over.
+// Link condition: the two vertices share exactly the neighbours that lie opposite in their common faces, all
+// their edges have two faces, or one on a rim, and no remaining face turns over.
 bool EdgeCollapser::may_collapse(std::uint32_t a, std::uint32_t b, const Vec3d& target,
                                  std::size_t least_edges) {
   neighbours(a, ring_a_);
@@ -57,15 +57,17 @@ bool EdgeCollapser::may_collapse(std::uint32_t a, std::uint32_t b, const Vec3d& 
   return !flips(a, b, target) && !flips(b, a, target);
 }
 
-bool EdgeCollapser::may_move(std::uint32_t gone, std::uint32_t keep) {
+bool EdgeCollapser::may_move(std::uint32_t keep, std::uint32_t gone) {
   neighbours(gone, ring_a_);
   neighbours(keep, ring_b_);
   const auto common_faces = static_cast<std::size_t>(std::count(ring_a_.begin(), ring_a_.end(), keep));
   const Fan fan = unite(ring_a_), other = unite(ring_b_);
   if (fan == Fan::kNone || other == Fan::kNone) return false;
   if (common_faces != (fan == Fan::kClosed ? 2 : 1) || common() != common_faces) return false;
-  const bool is_tetrahedron = other == Fan::kClosed && ring_a_.size() + ring_b_.size() < 7;
-  return !is_tetrahedron && !flips(gone, keep, mesh_.points[keep]);
+  const std::size_t edges = ring_a_.size() + ring_b_.size();
+  const bool is_tetrahedron = other == Fan::kClosed && edges < 7;
+  const bool is_triangle = fan == Fan::kOnRim && edges < 5;
+  return !is_tetrahedron && !is_triangle && !flips(gone, keep, mesh_.points[keep]);
 }
 
 std::size_t EdgeCollapser::common() const {

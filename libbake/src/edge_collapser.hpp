@@ -9,17 +9,18 @@
 
 namespace sqmap::bake {
 
-/// Triangles whose edges are contracted one by one, where that keeps the topology and turns no face over.
-/// Vertices and faces keep their numbers. Works on any triangles; non-manifold edges are left alone.
+/// Triangles whose edges are contracted one by one; callers ask first where that keeps the topology and turns
+/// no face over. Vertices and faces keep their numbers. Works on any triangles; non-manifold edges are left
+/// alone.
 class EdgeCollapser {
  public:
   explicit EdgeCollapser(Triangles& mesh);
 
-  /// Whether `gone` may be moved into `keep`, and both to `target`, and have `least_edges` >= 3 then.
+  /// Whether two vertices off the rim of the surface may become one at `target`, and have `least_edges` >= 3
+  /// then.
   bool may_collapse(std::uint32_t keep, std::uint32_t gone, const Vec3d& target, std::size_t least_edges);
-  /// Whether `gone` may be moved into `keep`, which stays where it is. On the rim of the surface only along
-  /// the rim.
-  bool may_move(std::uint32_t gone, std::uint32_t keep);
+  /// Whether `gone` may be moved into `keep`, which stays where it is. On the rim only along the rim.
+  bool may_move(std::uint32_t keep, std::uint32_t gone);
   void collapse(std::uint32_t keep, std::uint32_t gone, const Vec3d& target);
 
   /// The vertex that v has become part of.
@@ -30,7 +31,8 @@ class EdgeCollapser {
 
  private:
   enum class Fan { kClosed, kOnRim, kNone };
-  /// How the faces around a vertex lie whose neighbours, one entry a face, are these; one entry each then.
+  /// By how many faces a vertex shares with each neighbour: two with all, or one with two of them. Sorted
+  /// neighbours, one entry a face; one entry each then.
   static Fan unite(std::vector<std::uint32_t>& neighbours);
   void neighbours(std::uint32_t v, std::vector<std::uint32_t>& list) const;
   /// Of ring_a_ and ring_b_.

@@ -29,7 +29,9 @@ using Face = std::array<std::uint32_t, 3>;
 /// rounding of coordinates to float, or to six digits, tilts short edges by. The exact ones go first: others
 /// tilt the planes in which those lie.
 constexpr std::array kPlainSlopes{1e-5, 3e-4};
-/// No vertex has more neighbours after others have moved into it.
+/// Areas differ by less than this share where a surface stays the same.
+constexpr double kSameArea = 1e-3;
+/// About as many neighbours a vertex has at most after others have moved into it.
 constexpr std::size_t kMostNeighbours = 64;
 
 /// Contracts edges shorter than a length to their midpoints, the shortest first.
@@ -125,10 +127,10 @@ class PlainVertices {
       return std::pair(distance(a), a) < std::pair(distance(b), b);
     });
     for (const std::uint32_t u : ring_)
-      if (has_room(v, u) && collapser_.may_move(v, u)) return u;
+      if (has_room(v, u) && keeps_area(v, u) && collapser_.may_move(u, v)) return u;
     return std::nullopt;
   }
-  /// Of ring_, if v lies on a rim: those who do, one face each, where the rim is straight; else none.
+  /// If v lies on a rim, leaves of ring_ the two beside it there where the rim is straight, else none.
   void keep_ends_of_straight_rim(std::uint32_t v) {
     std::vector<std::uint32_t> ends;
     for (const std::uint32_t w : ring_)
@@ -138,6 +140,19 @@ class PlainVertices {
     if (ends.size() != 2) return;
     const Vec3d a = mesh_.points[ends[0]] - mesh_.points[v], b = mesh_.points[ends[1]] - mesh_.points[v];
     if (dot(a, b) < 0 && norm(cross(a, b)) <= slope_ * norm(a) * norm(b)) ring_ = ends;
+  }
+  /// Not so where the surface is folded flat onto itself.
+  bool keeps_area(std::uint32_t v, std::uint32_t into) const {
+    double before = 0, after = 0;
+    for (const std::uint32_t f : collapser_.faces_around(v)) {
+      std::array<Vec3d, 3> p{};
+      for (std::size_t i = 0; i < 3; ++i) p[i] = mesh_.points[mesh_.faces[f][i]];
+      before += norm(cross(p[1] - p[0], p[2] - p[0]));
+      for (std::size_t i = 0; i < 3; ++i)
+        if (mesh_.faces[f][i] == v) p[i] = mesh_.points[into];
+      after += norm(cross(p[1] - p[0], p[2] - p[0]));
+    }
+    return std::abs(after - before) <= kSameArea * before;
   }
   bool has_room(std::uint32_t v, std::uint32_t into) const {
     return collapser_.faces_around(v).size() + collapser_.faces_around(into).size() <= kMostNeighbours + 4;
@@ -150,6 +165,9 @@ class PlainVertices {
   std::vector<std::uint32_t> ring_;
 };
 
+/// Distances are the same that differ by this share of the face they are measured from.
+constexpr double kAsNear = 0.01;
+
 /// What is left of a mesh after collapses, and where each of its faces went.
 struct Collapsed {
   Triangles triangles;                      ///< faces in their old order
@@ -161,20 +179,32 @@ Vec3d centroid(const Triangles& triangles, std::uint32_t face) {
   return (1.0 / 3.0) * (triangles.points[a] + triangles.points[b] + triangles.points[c]);
 }
 
-/// The one of `candidates`, faces of `triangles`, that is nearest to p. Where p is nearest to an edge they
-/// share, to both alike, their centroids decide.
-std::uint32_t nearest_face(const Vec3d& p, const Triangles& triangles,
+double longest_side(const Triangles& triangles, std::uint32_t face) {
+  const auto& [a, b, c] = triangles.faces[face];
+  const Vec3d &p = triangles.points[a], &q = triangles.points[b], &r = triangles.points[c];
+  return std::max({norm(q - p), norm(r - q), norm(p - r)});
+}
+
+double distance_to(const Vec3d& p, const Triangles& triangles, std::uint32_t face) {
+  const auto& [a, b, c] = triangles.faces[face];
+  return norm(nearest_of_triangle(p, {triangles.points[a], triangles.points[b], triangles.points[c]}) - p);
+}
+
+/// The one of `candidates`, faces of `triangles`, that is nearest to p. Of those that are as near but for
+/// `tolerance`, as when p is nearest to an edge they share, the one with the nearest centroid.
+std::uint32_t nearest_face(const Vec3d& p, double tolerance, const Triangles& triangles,
                            std::span<const std::uint32_t> candidates) {
-  constexpr double kCentroidShare = 0.01;
+  std::vector<double> distance;
+  for (const std::uint32_t f : candidates) distance.push_back(distance_to(p, triangles, f));
+  const double most = *std::min_element(distance.begin(), distance.end()) + tolerance;
   std::uint32_t best = candidates.front();
   double least = std::numeric_limits<double>::infinity();
-  for (const std::uint32_t f : candidates) {
-    const auto& [a, b, c] = triangles.faces[f];
-    const Vec3d q = nearest_of_triangle(p, {triangles.points[a], triangles.points[b], triangles.points[c]});
-    const double distance = norm(q - p) + kCentroidShare * norm(centroid(triangles, f) - p);
-    if (!(distance < least)) continue;
-    least = distance;
-    best = f;
+  for (std::size_t i = 0; i < candidates.size(); ++i) {
+    if (!(distance[i] <= most)) continue;
+    const double to_centroid = norm(centroid(triangles, candidates[i]) - p);
+    if (!(to_centroid < least)) continue;
+    least = to_centroid;
+    best = candidates[i];
   }
   return best;
 }
@@ -189,18 +219,25 @@ Collapsed compacted(const Triangles& before, const Triangles& after, EdgeCollaps
     kept.push_back(f);
   }
   Collapsed result{extract(after.points, after.faces, kept), std::vector<std::uint32_t>(before.faces.size())};
-  // A face that collapsed is represented by the nearest of the faces around its vertices.
+  // A face that collapsed is represented by the nearest of the faces around its vertices, but for those of
+  // hubs, which all faces around them would look through.
+  constexpr std::size_t kHub = 4 * kMostNeighbours;
   const Rows faces_at = group_rows(after.points.size(), pairs);
-  std::vector<std::uint32_t> around;
+  std::vector<std::uint32_t> corners, around;
   for (std::uint32_t f = 0; f < before.faces.size(); ++f) {
     std::uint32_t stands_for = f;
     if (!collapser.is_alive(f)) {
+      corners.clear();
+      for (const std::uint32_t v : before.faces[f]) corners.push_back(collapser.survivor(v));
+      std::sort(corners.begin(), corners.end());
+      corners.erase(std::unique(corners.begin(), corners.end()), corners.end());
       around.clear();
-      for (const std::uint32_t v : before.faces[f]) {
-        const auto faces = faces_at[collapser.survivor(v)];
-        around.insert(around.end(), faces.begin(), faces.end());
-      }
-      stands_for = around.empty() ? kept.front() : nearest_face(centroid(before, f), after, around);
+      for (const bool with_hubs : {false, true})
+        for (const std::uint32_t v : corners)
+          if (around.empty() || !with_hubs)
+            if (with_hubs || faces_at[v].size() <= kHub)
+              around.insert(around.end(), faces_at[v].begin(), faces_at[v].end());
+      stands_for = nearest_face(centroid(before, f), kAsNear * longest_side(before, f), after, around);
     }
     result.face_of_face[f] = place[stands_for];
   }
@@ -235,6 +272,52 @@ Collapsed without_plain_vertices(const Triangles& input) {
   return result;
 }
 
+/// Pieces of one flat face, by where they lie along it.
+class PiecesAlong {
+ public:
+  PiecesAlong(const Triangles& whole, std::uint32_t face, const Triangles& pieces,
+              std::vector<std::uint32_t> faces)
+      : pieces_(pieces) {
+    const auto& [a, b, c] = whole.faces[face];
+    const Vec3d &p = whole.points[a], &q = whole.points[b], &r = whole.points[c];
+    for (const Vec3d& side : {q - p, r - q, p - r})
+      if (dot(side, side) > dot(along_, along_)) along_ = side;
+    along_ = normalized(along_);
+    for (const std::uint32_t f : faces) {
+      place_.emplace_back(dot(along_, centroid(pieces, f)), f);
+      largest_ = std::max(largest_, longest_side(pieces, f));
+    }
+    std::sort(place_.begin(), place_.end());
+  }
+
+  /// Those with their centroid in a face of `inputs` that is a part of the whole; the nearest, if there is
+  /// none.
+  std::vector<std::uint32_t> of(const Triangles& inputs, std::uint32_t face) const {
+    const Vec3d middle = centroid(inputs, face);
+    const double size = longest_side(inputs, face), tolerance = kAsNear * size;
+    std::vector<std::uint32_t> found = within(dot(along_, middle), size);
+    std::erase_if(
+        found, [&](std::uint32_t f) { return distance_to(centroid(pieces_, f), inputs, face) > tolerance; });
+    if (!found.empty()) return found;
+    std::vector<std::uint32_t> near = within(dot(along_, middle), 2 * largest_ + size);
+    if (near.empty()) near = within(dot(along_, middle), std::numeric_limits<double>::infinity());
+    return {nearest_face(middle, tolerance, pieces_, near)};
+  }
+
+ private:
+  std::vector<std::uint32_t> within(double place, double reach) const {
+    std::vector<std::uint32_t> found;
+    auto it = std::lower_bound(place_.begin(), place_.end(), std::pair(place - reach, 0U));
+    for (; it != place_.end() && it->first <= place + reach; ++it) found.push_back(it->second);
+    return found;
+  }
+
+  const Triangles& pieces_;
+  Vec3d along_;
+  std::vector<std::pair<double, std::uint32_t>> place_;
+  double largest_ = 0;
+};
+
 }  // namespace
 
 WorkingMesh make_working_mesh(const Triangles& input, double shortest_edge, double longest_edge) {
@@ -245,21 +328,16 @@ WorkingMesh make_working_mesh(const Triangles& input, double shortest_edge, doub
   Collapsed even = collapsed<ShortEdges>(split.triangles, shortest_edge);
 
   WorkingMesh working{std::move(even.triangles), std::vector<std::vector<std::uint32_t>>(input.faces.size())};
-  std::vector<std::vector<std::uint32_t>> split_of_plain(plain.triangles.faces.size());
-  for (std::uint32_t f = 0; f < split.source_face.size(); ++f)
-    split_of_plain[split.source_face[f]].push_back(f);
-  std::vector<std::uint32_t> inputs_of_plain(split_of_plain.size());
-  for (const std::uint32_t face : plain.face_of_face) ++inputs_of_plain[face];
-  tbb::parallel_for(std::size_t{0}, input.faces.size(), [&](std::size_t f) {
-    const std::uint32_t face = plain.face_of_face[f];
-    const std::vector<std::uint32_t>& faces = split_of_plain[face];
-    std::vector<std::uint32_t>& list = working.faces_of_input[f];
-    if (inputs_of_plain[face] == 1) {
-      for (const std::uint32_t g : faces) list.push_back(even.face_of_face[g]);
-    } else {  // it is a part of that face
-      const Vec3d middle = centroid(input, static_cast<std::uint32_t>(f));
-      list.push_back(even.face_of_face[nearest_face(middle, split.triangles, faces)]);
-    }
+  const std::size_t plain_count = plain.triangles.faces.size();
+  std::vector<std::vector<std::uint32_t>> splits(plain_count), inputs(plain_count);
+  for (std::uint32_t f = 0; f < split.source_face.size(); ++f) splits[split.source_face[f]].push_back(f);
+  for (std::uint32_t f = 0; f < input.faces.size(); ++f) inputs[plain.face_of_face[f]].push_back(f);
+  tbb::parallel_for(std::size_t{0}, plain_count, [&](std::size_t p) {
+    if (inputs[p].empty()) return;
+    const PiecesAlong pieces(plain.triangles, static_cast<std::uint32_t>(p), split.triangles, splits[p]);
+    for (const std::uint32_t f : inputs[p])
+      for (const std::uint32_t g : inputs[p].size() == 1 ? splits[p] : pieces.of(input, f))
+        working.faces_of_input[f].push_back(even.face_of_face[g]);
   });
   return working;
 }

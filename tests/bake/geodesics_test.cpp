@@ -307,5 +307,47 @@ TEST(WorkingMesh, IsAsFlatAsTheSurface) {
   }
 }
 
+double area_m2(const Triangles& mesh) {
+  double sum = 0;
+  for (const auto& [a, b, c] : mesh.faces)
+    sum += 0.5 * norm(cross(mesh.points[b] - mesh.points[a], mesh.points[c] - mesh.points[a]));
+  return sum;
+}
+
+TEST(WorkingMesh, LeavesSliversTetrahedraAndFlatFoldsWhole) {
+  const Triangles needle{{{0, 0, 0}, {1, 0, 0}, {0.5, 1e-5, 0}}, {{0, 1, 2}}};
+  const Triangles kite{{{0, 0, 0}, {1, 0, 0}, {0.5, 1e-5, 0}, {0.5, -1e-5, 0}}, {{0, 1, 2}, {1, 0, 3}}};
+  const Triangles flat_tetrahedron{{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0.3, 0.3, 1e-6}},
+                                   {{0, 2, 1}, {0, 1, 3}, {1, 2, 3}, {2, 0, 3}}};
+  // A square of two sheets in one plane, each a fan around a vertex of its own.
+  Triangles fold{{{-1, -1, 0}, {1, -1, 0}, {1, 1, 0}, {-1, 1, 0}, {0.2, 0.2, 0}, {0, 0, 0}}, {}};
+  for (std::uint32_t i = 0; i < 4; ++i) {
+    fold.faces.push_back({i, (i + 1) % 4, 4});
+    fold.faces.push_back({(i + 1) % 4, i, 5});
+  }
+  for (const Triangles& input : {needle, kite, flat_tetrahedron, fold}) {
+    const WorkingMesh working = make_working_mesh(input, 1e-9, 1e3);
+    EXPECT_NEAR(area_m2(working.triangles), area_m2(input), 2e-3 * area_m2(input));
+    ASSERT_EQ(working.faces_of_input.size(), input.faces.size());
+    for (const auto& list : working.faces_of_input) EXPECT_FALSE(list.empty());
+  }
+}
+
+TEST(WorkingMesh, TellsASmallFeatureFromTheFlatAroundIt) {
+  Mesh box = test::box({1, 1, 1});
+  for (int time = 0; time < 5; ++time) box = test::subdivided(box);
+  for (Vec3d& p : box.vertices_m)
+    if (p.z > 0.99 && std::hypot(p.x - 0.3, p.y - 0.2) < 0.1) p.z += 0.1;
+  const WorkingMesh working = make_working_mesh(triangles(box), 1e-9, 0.3);
+  EXPECT_LT(working.triangles.faces.size(), box.faces.size() / 3);
+  const Surface surface = make_surface(working.triangles);
+  for (std::size_t f = 0; f < box.faces.size(); ++f) {
+    const auto& [a, b, c] = box.faces[f];
+    const Vec3d n =
+        normalized(cross(box.vertices_m[b] - box.vertices_m[a], box.vertices_m[c] - box.vertices_m[a]));
+    for (const std::uint32_t g : working.faces_of_input[f]) EXPECT_GT(dot(n, surface.normal[g]), 0.999);
+  }
+}
+
 }  // namespace
 }  // namespace sqmap::bake
