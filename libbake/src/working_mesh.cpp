@@ -276,7 +276,7 @@ Collapsed without_plain_vertices(const Triangles& input) {
 class PiecesAlong {
  public:
   PiecesAlong(const Triangles& whole, std::uint32_t face, const Triangles& pieces,
-              std::vector<std::uint32_t> faces)
+              const std::vector<std::uint32_t>& faces)
       : pieces_(pieces) {
     const auto& [a, b, c] = whole.faces[face];
     const Vec3d &p = whole.points[a], &q = whole.points[b], &r = whole.points[c];
