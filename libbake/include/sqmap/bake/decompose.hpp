@@ -44,7 +44,8 @@ struct Decomposition {
 
 /// Cuts each component along borders of its locales. Segments are connected over edges, unless components are
 /// joined, and numbered by descending area (ties: by centroid). The result does not depend on the number of
-/// threads. Errors: kBadOption; kCancelled; kInvalidMesh when `prepared.component` does not match the faces.
+/// threads, nor on vertices that carry no shape, as where faces are cut into coplanar ones. Errors:
+/// kBadOption; kCancelled; kInvalidMesh when `prepared.component` does not match the faces.
 Result<Decomposition> decompose(const PreparedMesh& prepared, const DecomposeOptions& options,
                                 const Progress& progress);
 
