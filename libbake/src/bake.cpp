@@ -307,7 +307,7 @@ Result<Drawn> draw_maps(Asset& asset, MapDrawer& drawer, std::size_t most_shapes
   return Drawn{given.value().depth, by_budget, given.value().bytes};
 }
 
-/// The asset with the superquadrics that its partition was judged by. The full fits are smaller, but one in
+/// The asset with the quick fits, such as its partition was judged by. The full fits are smaller, but one in
 /// many sees so little of the surface that no map of it meets the target.
 Asset with_quick_fits(const Asset& asset, const std::vector<Piece>& pieces) {
   Asset quick = asset;

@@ -10,8 +10,8 @@ BoundingSphere sphere_of(const Superquadric& shape, const Pose& object_from_part
   return {object_from_part.translation_m, bounding_radius_m(shape)};
 }
 
-Result<FittedPart> fit_part(const SolidSet& set, const Cell& cell, const FitOptions& options) {
-  const std::vector<Vec3d> points_m = set.points(cell.solid);
+Result<FittedPart> fit_part(const SolidSet& set, const Solid& solid, const FitOptions& options) {
+  const std::vector<Vec3d> points_m = set.points(solid);
   auto fit = fit_superquadric(points_m, options);
   if (!fit) return fit.error();
   // A box wants sharper edges than the usual bound on exponents allows. On other parts that bound costs 2-3 %
@@ -30,9 +30,7 @@ Result<FittedPart> fit_part(const SolidSet& set, const Cell& cell, const FitOpti
   part.shape = fit.value().shape;
   part.object_from_part = fit.value().object_from_part;
   part.sphere = sphere_of(part.shape, part.object_from_part);
-  part.segment = cell.segment;
-  part.reason = cell.reason;
-  part.volume_m3 = set.volume_m3(cell.solid);
+  part.volume_m3 = set.volume_m3(solid);
   return FittedPart{std::move(part), {iterations, fit.value().stop}};
 }
 

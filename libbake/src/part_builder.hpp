@@ -7,7 +7,7 @@
 #include "sqmap/bake/bake.hpp"
 
 #include "map_builder.hpp"
-#include "partition.hpp"
+#include "solid.hpp"
 
 namespace sqmap::bake {
 
@@ -20,8 +20,8 @@ struct FittedPart {
 /// The ball around a superquadric, object frame.
 BoundingSphere sphere_of(const Superquadric& shape, const Pose& object_from_part);
 
-/// The bounding superquadric of a cell.
-Result<FittedPart> fit_part(const SolidSet& set, const Cell& cell, const FitOptions& options);
+/// The bounding superquadric of a solid. The part's segment and reason are the caller's to set.
+Result<FittedPart> fit_part(const SolidSet& set, const Solid& solid, const FitOptions& options);
 
 /// A map of fixed resolution with 16-bit codes, for judging a partition before the final maps are planned.
 void draft_map(Part& part, const MeshQueries& queries, std::uint32_t quadrant_cells);

@@ -12,6 +12,7 @@
 
 #include "measure.hpp"
 #include "part_builder.hpp"
+#include "shed.hpp"
 
 namespace sqmap::bake {
 
@@ -40,9 +41,10 @@ constexpr int kMostTrials = 4;
 Result<Piece> draft_piece(const SolidSet& set, Cell cell, const MeshQueries& queries, FitOptions options) {
   options.quick = true;
   options.taper = false;
-  auto fitted = fit_part(set, cell, options);
+  auto fitted = fit_part(set, cell.solid, options);
   if (!fitted) return fitted.error();
-  Piece piece{std::move(cell), std::move(fitted.value().part), fitted.value().fit, {}, {}, {}, 0, {}};
+  Piece piece{std::move(cell), {}, std::move(fitted.value().part), fitted.value().fit, {}, {}, {}, 0, {}};
+  piece.label();
   draft_map(piece.part, queries, kDraftQuadrantCells);
   return piece;
 }
@@ -54,15 +56,17 @@ Outcome fit_pieces(const SolidSet& set, std::vector<Piece>& pieces, const FitOpt
   rigid.taper = false;
   tbb::parallel_for(std::size_t{0}, pieces.size(), [&](std::size_t k) {
     if (options.taper) {
-      if (auto tapered = fit_part(set, pieces[k].cell, options))
+      if (auto tapered = fit_part(set, pieces[k].held, options))
         pieces[k].tapered = std::move(tapered).value();
     }
-    auto fitted = fit_part(set, pieces[k].cell, rigid);
+    auto fitted = fit_part(set, pieces[k].held, rigid);
     if (fitted) {
       pieces[k].quick = FittedPart{std::move(pieces[k].part), pieces[k].fit};
       pieces[k].quick->part.map = {};
       pieces[k].part = std::move(fitted.value().part);
+      pieces[k].quick->part.volume_m3 = pieces[k].part.volume_m3;  // of the same solid
       pieces[k].fit = fitted.value().fit;
+      pieces[k].label();
     } else {
       errors[k] = fitted.error();
     }
@@ -294,6 +298,7 @@ Result<Refinement> refine(SolidSet& set, std::vector<Cell> cells, const MeshQuer
   Refinement result{std::move(refiner.pieces), refiner.meets_target() ? "target"
                                                : is_full              ? "parts"
                                                                       : "gain"};
+  shed_covered(set, result.pieces, options.fit);
   if (auto outcome = fit_pieces(set, result.pieces, options.fit); !outcome) return outcome.error();
   return result;
 }

@@ -8,6 +8,7 @@
 #include "sqmap/bake/bake.hpp"
 
 #include "part_builder.hpp"
+#include "partition.hpp"
 
 namespace sqmap::bake {
 
@@ -17,16 +18,23 @@ struct Spare {
   double loss_m;  ///< by which the error of all parts together rose; negative: fell
 };
 
-/// A cell and the superquadric around it, with a draft map.
+/// A cell and the superquadric around it, with a draft map while the partition is refined.
 struct Piece {
   Cell cell;
+  Solid held;  ///< what the superquadric bounds at the end: the cell, or less where others hold it
   Part part;
   PartFit fit;
-  std::optional<FittedPart> quick;    ///< what the partition was judged by, once `part` is the full fit
-  std::optional<FittedPart> tapered;  ///< the full fit of FitOptions::taper
+  std::optional<FittedPart> quick;             ///< a quick fit, once `part` is the full one
+  std::optional<FittedPart> tapered;           ///< the full fit of FitOptions::taper
   std::optional<std::vector<HalfSpace>> cuts;  ///< planes to split it by, best first
   std::size_t cuts_tried{};                    ///< of them, those that did not pay
   std::optional<Spare> spare;                  ///< of those, the one that cost least
+
+  /// Says on the part what its cell says.
+  void label() {
+    part.segment = cell.segment;
+    part.reason = cell.reason;
+  }
 };
 
 struct Refinement {
@@ -38,7 +46,8 @@ struct Refinement {
 /// the mesh, again and again, until the mean error is within the target, the parts are spent, or no split
 /// pays. A split that does not lower the error is undone: it would cost bytes, and its seam is one more place
 /// where rays see little. Where nothing else is left, splits that do not pay are kept on trial, for what
-/// their halves may gain; the best partition on the way is the result. Errors: kCancelled, kBakeFailed.
+/// their halves may gain; the best partition on the way is the result,
+/// its parts less what others hold (shed.hpp) and with their full fits. Errors: kCancelled, kBakeFailed.
 Result<Refinement> refine(SolidSet& set, std::vector<Cell> cells, const MeshQueries& queries, double r_max_m,
                           const BakeOptions& options, const Progress& progress);
 

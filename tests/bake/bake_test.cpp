@@ -73,6 +73,11 @@ TEST_P(AnalyticShape, IsBoundedAndItsDistancesAreTrue) {
     }
   }
 
+  // Parts share the mesh out among them, whatever their superquadrics hold for each other.
+  double held_m3 = 0;
+  for (const Part& part : asset.parts) held_m3 += part.volume_m3;
+  EXPECT_NEAR(held_m3, asset.mesh.volume_m3, 1e-9 * shape.volume_m3);
+
   // The baker's own figures, and the same again with points and an oracle of the test's.
   EXPECT_LE(finest(asset, 3).eq35_percent, 0.1);
   EXPECT_LE(finest(asset, 3).depth_mean_percent, 0.12);

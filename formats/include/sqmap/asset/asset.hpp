@@ -30,7 +30,7 @@ struct Part {
   CutReason reason{CutReason::kWhole};
   std::uint32_t vertex_count{};  ///< N_m of the paper's layer rule: mesh vertices of this part
   std::uint32_t face_count{};    ///< mesh faces of this part, after repair
-  double volume_m3{};            ///< volume of the part, its cuts closed [m^3]
+  double volume_m3{};            ///< of what the superquadric bounds, its cuts closed [m^3]
   DistanceMap map;
   SurfaceBounds bounds;  ///< none unless the bake was asked for them
   friend bool operator==(const Part&, const Part&) = default;
