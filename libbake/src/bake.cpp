@@ -136,12 +136,6 @@ Decomposition on_fine_faces(Decomposition segments, const Mesh& fine) {
   return segments;
 }
 
-double area_m2(const Mesh& mesh, std::uint32_t face) {
-  const auto& t = mesh.faces[face];
-  const Vec3d& a = mesh.vertices_m[t[0]];
-  return 0.5 * norm(cross(mesh.vertices_m[t[1]] - a, mesh.vertices_m[t[2]] - a));
-}
-
 /// Part of each face of the mesh: the one that holds most of its area.
 std::vector<std::uint16_t> owners(const std::vector<Piece>& pieces, const Mesh& fine,
                                   std::size_t face_count) {
@@ -173,19 +167,6 @@ std::vector<std::uint16_t> owners(const std::vector<Piece>& pieces, const Mesh& 
     }
   }
   return owner;
-}
-
-/// Surface of the mesh that each piece holds [m^2].
-std::vector<double> surface_areas(const std::vector<Piece>& pieces, const Mesh& fine) {
-  std::vector<double> areas_m2;
-  for (const Piece& piece : pieces) {
-    double sum_m2 = 0;
-    for (const std::uint32_t f : piece.cell.solid.face) {
-      if (f != kNewFace) sum_m2 += area_m2(fine, f);
-    }
-    areas_m2.push_back(sum_m2);
-  }
-  return areas_m2;
 }
 
 /// Faces and vertices of the mesh that each part owns.
@@ -432,7 +413,8 @@ Result<BakeResult> bake(const SourceMesh& source, const BakeOptions& asked, cons
   asset.face_labels = label_input_faces(owner, prepared.mesh, source.source_face_count);
   const double target_m = options.max_error_percent / 100 * r_max_m;
   const MapTarget target{target_m, options.max_bytes};
-  const std::vector<double> areas_m2 = surface_areas(pieces, fine);
+  std::vector<double> areas_m2;
+  for (const Piece& piece : pieces) areas_m2.push_back(piece.area_m2);
   auto drawn = draw_smallest(asset, pieces, areas_m2, queries, target, options.seed);
   if (!drawn) return drawn.error();
   if (result.stopped_by == "target" && !drawn.value().by_budget && drawn.value().depth_in_aims > 1) {

@@ -2,6 +2,7 @@
 #include "part_builder.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 namespace sqmap::bake {
@@ -34,10 +35,17 @@ Result<FittedPart> fit_part(const SolidSet& set, const Solid& solid, const FitOp
   return FittedPart{std::move(part), {iterations, fit.value().stop}};
 }
 
-void draft_map(Part& part, const MeshQueries& queries, std::uint32_t quadrant_cells) {
+double draft_map(Part& part, const MeshQueries& queries, std::uint32_t quadrant_cells) {
   const RayField field =
       trace_map(part.shape, part.object_from_part, 2 * quadrant_cells + 1, 4 * quadrant_cells, queries);
   part.map = quantise(field, {1, 1, 16});
+  const MapGrid grid(part.shape, field.rows, field.cols);
+  const CoarseningError by_rows = coarsening_error(field, grid, 2, 1);
+  const CoarseningError by_cols = coarsening_error(field, grid, 1, 2);
+  // About what such a map is chosen by: interpolated depth counts less than occupancy.
+  const auto loss_m = [](const CoarseningError& e) { return e.depth_m / 4 + e.occupancy_m; };
+  // Texels are spent best where rows and columns lose alike.
+  return 2 * std::sqrt(loss_m(by_rows) * loss_m(by_cols));
 }
 
 }  // namespace sqmap::bake

@@ -24,6 +24,7 @@ BoundingSphere sphere_of(const Superquadric& shape, const Pose& object_from_part
 Result<FittedPart> fit_part(const SolidSet& set, const Solid& solid, const FitOptions& options);
 
 /// A map of fixed resolution with 16-bit codes, for judging a partition before the final maps are planned.
-void draft_map(Part& part, const MeshQueries& queries, std::uint32_t quadrant_cells);
+/// Returns what one of half the resolution would lose [m], which tells how many texels the part will need.
+double draft_map(Part& part, const MeshQueries& queries, std::uint32_t quadrant_cells);
 
 }  // namespace sqmap::bake

@@ -194,6 +194,12 @@ void label_caps(const Solid& solid, std::vector<std::uint32_t>& label) {
 
 }  // namespace
 
+double area_m2(const Mesh& mesh, std::uint32_t face) {
+  const auto& t = mesh.faces[face];
+  const Vec3d& a = mesh.vertices_m[t[0]];
+  return 0.5 * norm(cross(mesh.vertices_m[t[1]] - a, mesh.vertices_m[t[2]] - a));
+}
+
 std::vector<Cell> close_segments(SolidSet& set, const Solid& whole, const Decomposition& segments) {
   std::vector<Cell> cells;
   Solid rest = whole;

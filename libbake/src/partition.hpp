@@ -17,6 +17,9 @@ struct Cell {
   CutReason reason{CutReason::kWhole};
 };
 
+/// Area of a face [m^2].
+double area_m2(const Mesh& mesh, std::uint32_t face);
+
 /// The segments as closed solids, in the decomposition's order.
 std::vector<Cell> close_segments(SolidSet& set, const Solid& whole, const Decomposition& segments);
 

@@ -2,6 +2,7 @@
 #include "refine.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <numeric>
 #include <optional>
@@ -34,6 +35,10 @@ constexpr double kWorthSplitting = 2;
 // superquadrics enclose beside the mesh: where that is large maps see the surface from far off and at a
 // slant.
 constexpr double kVolumeShare = 0.3;
+// Bytes that a target of what drafts lose would ask for in all, as the six samples have it; and those of a
+// part itself, with as many again for the time it takes at run time.
+constexpr double kDraftBytes = 4000;
+constexpr double kPartBytes = 4000;
 // So many splits that do not pay are kept on trial, one after another, before the search ends.
 constexpr int kMostTrials = 4;
 
@@ -43,9 +48,12 @@ Result<Piece> draft_piece(const SolidSet& set, Cell cell, const MeshQueries& que
   options.taper = false;
   auto fitted = fit_part(set, cell.solid, options);
   if (!fitted) return fitted.error();
-  Piece piece{std::move(cell), {}, std::move(fitted.value().part), fitted.value().fit, {}, {}, {}, 0, {}};
+  Piece piece{
+      std::move(cell), {}, std::move(fitted.value().part), fitted.value().fit, 0, 0, {}, {}, {}, 0, {}};
   piece.label();
-  draft_map(piece.part, queries, kDraftQuadrantCells);
+  piece.loss_m = draft_map(piece.part, queries, kDraftQuadrantCells);
+  for (const std::uint32_t face : piece.cell.solid.face)
+    if (face != kNewFace) piece.area_m2 += area_m2(queries.mesh, face);
   return piece;
 }
 
@@ -154,6 +162,8 @@ class Refiner {
   }
 
   bool meets_target() const { return error_m() <= target_m_; }
+  /// What final maps must reach, too.
+  bool is_within_target() const { return kRefineShare * error_m() <= target_m_; }
 
   /// Splits the worst piece of those with a cut left to try, and keeps the split if it pays. False: no piece
   /// has one.
@@ -189,9 +199,9 @@ class Refiner {
   }
 
   void remember_best() {
-    const double cost_m = std::max(error_m(), target_m_) + price_m() * static_cast<double>(pieces.size());
-    if (!(cost_m < least_cost_m_)) return;
-    least_cost_m_ = cost_m;
+    const double cost_now = cost();
+    if (!best_pieces_.empty() && !(cost_now < least_cost_)) return;  // it may not be finite
+    least_cost_ = cost_now;
     best_pieces_ = pieces;
     best_error_m_ = error_m_;
     trials_ = 0;
@@ -208,6 +218,24 @@ class Refiner {
 
  private:
   double error_m() const { return std::accumulate(error_m_.begin(), error_m_.end(), 0.0); }
+  /// Bytes in memory that maps of the target's error will need, about. A map errs in inverse proportion to
+  /// the root of its texels: so maps that lose e_k at some resolution and count by their areas w_k meet a
+  /// mean error T with fewest texels together at (sum (w_k e_k)^(2/3))^3 / T^2 times those of that
+  /// resolution.
+  double bytes() const {
+    double sum = 0, all_m2 = 0;
+    for (const Piece& piece : pieces) {
+      sum += std::cbrt(std::pow(piece.area_m2 * piece.loss_m, 2));
+      all_m2 += piece.area_m2;
+    }
+    const double mean_m = options_.max_error_percent / 100 * r_max_m_;
+    const double drafts = std::pow(sum, 3) / std::pow(all_m2 * mean_m, 2);
+    return kDraftBytes * drafts + kPartBytes * static_cast<double>(pieces.size());
+  }
+  /// What the best partition has least of: bytes, times the square of what the error exceeds its target by,
+  /// since the bytes of maps grow like that.
+  double cost() const { return bytes() * std::pow(std::max(error_m() / target_m_, 1.0), 2); }
+
   double price_m() const { return kPartPrice * target_m_ / options_.max_parts; }
 
   Outcome judge_pieces() {
@@ -272,7 +300,7 @@ class Refiner {
   ShellPoints shell_;
   std::vector<double> error_m_;  ///< that each piece adds to the sum over the shell
   int trials_ = 0;               ///< since the best partition
-  double least_cost_m_ = std::numeric_limits<double>::infinity();
+  double least_cost_ = std::numeric_limits<double>::infinity();
   std::vector<Piece> best_pieces_;
   std::vector<double> best_error_m_;
 };
@@ -295,9 +323,9 @@ Result<Refinement> refine(SolidSet& set, std::vector<Cell> cells, const MeshQuer
   }
   refiner.end();
   const bool is_full = refiner.pieces.size() >= options.max_parts;
-  Refinement result{std::move(refiner.pieces), refiner.meets_target() ? "target"
-                                               : is_full              ? "parts"
-                                                                      : "gain"};
+  Refinement result{std::move(refiner.pieces), refiner.is_within_target() ? "target"
+                                               : is_full                  ? "parts"
+                                                                          : "gain"};
   shed_covered(set, result.pieces, options.fit);
   if (auto outcome = fit_pieces(set, result.pieces, options.fit); !outcome) return outcome.error();
   return result;

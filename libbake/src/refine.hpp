@@ -24,6 +24,8 @@ struct Piece {
   Solid held;  ///< what the superquadric bounds at the end: the cell, or less where others hold it
   Part part;
   PartFit fit;
+  double loss_m{};                             ///< draft_map()
+  double area_m2{};                            ///< surface of the mesh in the cell
   std::optional<FittedPart> quick;             ///< a quick fit, once `part` is the full one
   std::optional<FittedPart> tapered;           ///< the full fit of FitOptions::taper
   std::optional<std::vector<HalfSpace>> cuts;  ///< planes to split it by, best first
