@@ -38,12 +38,12 @@ constexpr std::uint32_t kShellPoints = 16000;
 constexpr double kShellWidth = 0.03;
 // Maps are drawn at most so often, each time for less than before: by the root of what the worse error
 // exceeds its aim, and a little. That goes on while an error that exceeds its aim falls by a fifth of what
-// its target did. Aims are the target and a tenth for depth, and ten and a half times the target, as a share
+// its target did. Aims are a little less than the target for depth, and ten and a half times it, as a share
 // of R_max, for the share of points on the wrong side.
 constexpr int kMapRounds = 5;
 constexpr double kMostStricter = 0.4, kLeastStricter = 0.97;
 constexpr double kWorthFinerMaps = 0.2;
-constexpr double kNearTarget = 1.1;
+constexpr double kDepthAim = 0.97;
 // Parts are given coarser maps back up to this share of the aims: chosen by the points that judge it, they
 // do a little worse at others.
 constexpr double kGivenBack = 0.93;
@@ -211,7 +211,7 @@ Result<Shortfall> judge(const Asset& asset, const ShellPoints& shell, double tar
   auto object = runtime::Object::build(asset);
   if (!object) return object.error();
   const ShellError error = shell_error(object.value(), shell);
-  return Shortfall{error.depth_mean_m / (kNearTarget * target_m),
+  return Shortfall{error.depth_mean_m / (kDepthAim * target_m),
                    error.misclassified * asset.r_max_m / (kWrongSides * target_m),
                    object.value().resident_bytes()};
 }
