@@ -36,6 +36,8 @@ constexpr double kVertexTolerance = 2;
 // Shell that finished maps are judged in: points, and half width as a share of R_max.
 constexpr std::uint32_t kShellPoints = 16000;
 constexpr double kShellWidth = 0.03;
+// Added to the seed of the points that errors are measured at: not those that maps were chosen by.
+constexpr std::uint64_t kMeasureSeed = 1000;
 // Maps are drawn at most so often, each time for less than before: by the root of what the worse error
 // exceeds its aim, and a little. That goes on while an error that exceeds its aim falls by a fifth of what
 // its target did. Aims are a little less than the target for depth, and ten and a half times it, as a share
@@ -447,7 +449,7 @@ Result<BakeResult> bake(const SourceMesh& source, const BakeOptions& asked, cons
   stages.begin("measure");
   auto object = runtime::Object::build(asset);
   if (!object) return object.error();
-  asset.errors = measure(asset, object.value(), queries, options.sample_count, options.seed);
+  asset.errors = measure(asset, object.value(), queries, options.sample_count, options.seed + kMeasureSeed);
   stages.end();
   result.times = std::move(stages.times);
   return result;
