@@ -48,8 +48,9 @@ struct Refinement {
 /// the mesh, again and again, until the mean error is within the target, the parts are spent, or no split
 /// pays. A split that does not lower the error is undone: it would cost bytes, and its seam is one more place
 /// where rays see little. Where nothing else is left, splits that do not pay are kept on trial, for what
-/// their halves may gain; the best partition on the way is the result,
-/// its parts less what others hold (shed.hpp) and with their full fits. Errors: kCancelled, kBakeFailed.
+/// their halves may gain. The result is the partition on the way whose maps need fewest bytes, where it errs
+/// beyond the target the more; its parts are rid of what others hold (shed.hpp) and have their full fits.
+/// Errors: kCancelled, kBakeFailed.
 Result<Refinement> refine(SolidSet& set, std::vector<Cell> cells, const MeshQueries& queries, double r_max_m,
                           const BakeOptions& options, const Progress& progress);
 
