@@ -220,7 +220,8 @@ TEST(Bake, FindsThePartsBehindASplitThatDoesNotPay) {
 
 #ifdef SQMAP_MESH_DIR
 TEST(Bake, TakesThePartitionWhoseMapsNeedFewBytes) {
-  // Cut on as long as that lowers the error of drafts, the hand has 22 parts in 240 kB, no more accurate.
+  // Cut on as long as that lowers the error of drafts, the hand has 22 parts in 240 kB: further below the
+  // target than was asked for.
   const auto path = std::filesystem::path(SQMAP_MESH_DIR) / "hand.off";
   if (!std::filesystem::exists(path)) GTEST_SKIP() << "no " << path;
   auto hand = read_mesh(path.string(), {});
