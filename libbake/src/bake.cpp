@@ -45,6 +45,7 @@ constexpr std::uint64_t kMeasureSeed = 1000;
 constexpr int kMapRounds = 5;
 constexpr double kMostStricter = 0.4, kLeastStricter = 0.97;
 constexpr double kWorthFinerMaps = 0.2;
+constexpr int kMostSteps = 8;  // down to a target that asks for other maps
 constexpr double kDepthAim = 0.97;
 // Parts are given coarser maps back up to this share of the aims: chosen by the points that judge it, they
 // do a little worse at others.
@@ -249,6 +250,13 @@ Result<Shortfall> give_back(Asset& asset, Shortfall now, const std::vector<Part>
   return now;
 }
 
+bool have_same_texels(const std::vector<Part>& a, const std::vector<Part>& b) {
+  return std::ranges::equal(a, b, [](const Part& p, const Part& q) {
+    return p.shape == q.shape && p.map.rows == q.map.rows && p.map.cols == q.map.cols &&
+           p.map.bits == q.map.bits;
+  });
+}
+
 /// The maps that the target asks for. What they lose beside seams, where one chart ends and the next has not
 /// begun, shows only between parts: as long as the error of the whole exceeds the target, and finer maps
 /// lower it enough, they are drawn for a stricter one.
@@ -261,7 +269,14 @@ Result<Drawn> draw_maps(Asset& asset, MapDrawer& drawer, std::size_t most_shapes
   MapTarget asked = target;
   double share = 1;  // of the target before
   for (int round = 0; round < kMapRounds; ++round) {
-    const bool budget_decided = drawer.draw(asset.parts, asked, most_shapes);
+    bool budget_decided = drawer.draw(asset.parts, asked, most_shapes);
+    // Maps come in steps: on, down to a target that asks for others.
+    const double step = share;
+    for (int k = 0; k < kMostSteps && round > 0 && have_same_texels(asset.parts, best); ++k) {
+      asked.error_m *= step;
+      share *= step;
+      budget_decided = drawer.draw(asset.parts, asked, most_shapes);
+    }
     asset.sphere = enclosing_sphere(asset.parts);
     tbb::parallel_for(std::size_t{0}, asset.parts.size(), [&](std::size_t k) {
       add_vertex_samples(asset.parts[k], queries, kVertexTolerance * target.error_m);

@@ -218,6 +218,13 @@ TEST(Bake, FindsThePartsBehindASplitThatDoesNotPay) {
   EXPECT_EQ(result.value().stopped_by, "target");
 }
 
+TEST(Bake, AsksForFinerMapsUntilTheyAreFiner) {
+  // Two fifths of the target draw the same maps as the target, two fifths of that others.
+  auto result = bake(test::as_source(test::thin_sheet(1, 0.002)), {});
+  ASSERT_TRUE(result.ok());
+  EXPECT_LT(finest(result.value().asset, 3).depth_mean_percent, 0.25);  // with the first maps 0.56
+}
+
 #ifdef SQMAP_MESH_DIR
 TEST(Bake, TakesThePartitionWhoseMapsNeedFewBytes) {
   // Cut on as long as that lowers the error of drafts, the hand has 22 parts in 240 kB: further below the
