@@ -33,26 +33,29 @@ namespace {
 
 // Vertex samples are kept where the surface misses the vertex by this multiple of the error target.
 constexpr double kVertexTolerance = 2;
-// Shell that finished maps are judged in: points, and half width as a share of R_max.
+// Shells that finished maps are judged in: points, and half widths as shares of R_max. Of the narrow one's
+// points five times as many are on the wrong side.
 constexpr std::uint32_t kShellPoints = 16000;
-constexpr double kShellWidth = 0.03;
+constexpr double kShellWidth = 0.03, kNarrowShellWidth = 0.005;
 // Added to the seed of the points that errors are measured at: not those that maps were chosen by.
 constexpr std::uint64_t kMeasureSeed = 1000;
-// Maps are drawn at most so often, each time for less than before: by the root of what the worse error
-// exceeds its aim, and a little. That goes on while an error that exceeds its aim falls by a fifth of what
-// its target did. Aims are a little less than the target for depth, and ten and a half times it, as a share
-// of R_max, for the share of points on the wrong side.
-constexpr int kMapRounds = 5;
+// Maps are drawn at most so often. Each time their target changes by the root of what the worse error is off
+// its aim: downwards a little more, and only as long as an error that exceeds its aim falls by a fifth of
+// what its target does; once they meet their aims, up or down, until that would change the target by less
+// than kSameTarget. Aims are a little less than the target for depth, and 11.2 and 58 times it, as a share of
+// R_max, for the share of points on the wrong side in either shell.
+constexpr int kMapRounds = 7;
 constexpr double kMostStricter = 0.4, kLeastStricter = 0.97;
 constexpr double kWorthFinerMaps = 0.2;
 constexpr int kMostSteps = 8;  // down to a target that asks for other maps
-constexpr double kDepthAim = 0.97;
+constexpr double kLoosest = 4, kSameTarget = 0.01;
+constexpr std::size_t kSmallEnough = 65536;  // bytes; fits in the second cache beside others
+constexpr double kDepthAim = 0.97, kWrongSides = 11.2, kWrongSidesNear = 58;
 // Parts are given coarser maps back up to this share of the aims: chosen by the points that judge it, they
 // do a little worse at others.
-constexpr double kGivenBack = 0.93;
+constexpr double kGivenBack = 0.98;
 // Less than this share of all texels is not worth the question.
 constexpr double kLeastGivenBack = 0.003;
-constexpr double kWrongSides = 10.5;
 // Parts take whole triangles. So that long ones do not tie together what should be cut, edges are halved down
 // to this share of R_max first, as far as the number of added triangles allows.
 constexpr double kLongestEdge = 1.0 / 16;
@@ -210,33 +213,41 @@ struct Shortfall {
   double worse() const { return std::max(depth, sides); }
 };
 
-Result<Shortfall> judge(const Asset& asset, const ShellPoints& shell, double target_m) {
+/// Points near the surface that maps are judged by.
+struct Shells {
+  ShellPoints wide, narrow;
+};
+
+Result<Shortfall> judge(const Asset& asset, const Shells& shells, double target_m) {
   auto object = runtime::Object::build(asset);
   if (!object) return object.error();
-  const ShellError error = shell_error(object.value(), shell);
-  return Shortfall{error.depth_mean_m / (kDepthAim * target_m),
-                   error.misclassified * asset.r_max_m / (kWrongSides * target_m),
-                   object.value().resident_bytes()};
+  const ShellError wide = shell_error(object.value(), shells.wide);
+  const ShellError narrow = shell_error(object.value(), shells.narrow);
+  const double targets = asset.r_max_m / target_m;
+  return Shortfall{
+      wide.depth_mean_m / (kDepthAim * target_m),
+      targets * std::max(wide.misclassified / kWrongSides, narrow.misclassified / kWrongSidesNear),
+      object.value().resident_bytes()};
 }
 
-/// Gives parts back the maps they had in `first`, those first that save most, as long as neither error rises
-/// beyond kGivenBack of what it may be, or where it is: not every part errs less with a finer map.
-Result<Shortfall> give_back(Asset& asset, Shortfall now, const std::vector<Part>& first,
-                            const ShellPoints& shell, double target_m) {
+/// Gives parts the `coarser` maps they had, those first that save most, as long as neither error rises beyond
+/// kGivenBack of what it may be, or where it is: not every part errs less with a finer map.
+Result<Shortfall> give_back(Asset& asset, Shortfall now, const std::vector<Part>& coarser,
+                            const Shells& shells, double target_m) {
   const auto bits = [](const Part& part) { return 1.0 * part.map.rows * part.map.cols * part.map.bits; };
-  const auto saved = [&](std::size_t k) { return bits(asset.parts[k]) - bits(first[k]); };
+  const auto saved = [&](std::size_t k) { return bits(asset.parts[k]) - bits(coarser[k]); };
   double all_bits = 0;
   for (const Part& part : asset.parts) all_bits += bits(part);
-  std::vector<std::size_t> order(first.size());
+  std::vector<std::size_t> order(coarser.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
   std::stable_sort(order.begin(), order.end(),
                    [&](std::size_t i, std::size_t k) { return saved(i) > saved(k); });
   for (const std::size_t k : order) {
     if (!(saved(k) > kLeastGivenBack * all_bits)) break;
     Part kept = std::move(asset.parts[k]);
-    asset.parts[k] = first[k];
+    asset.parts[k] = coarser[k];
     asset.sphere = enclosing_sphere(asset.parts);
-    auto without = judge(asset, shell, target_m);
+    auto without = judge(asset, shells, target_m);
     if (!without) return without;
     const Shortfall& then = without.value();
     if (then.depth <= std::max(kGivenBack, now.depth) && then.sides <= std::max(kGivenBack, now.sides) &&
@@ -257,22 +268,25 @@ bool have_same_texels(const std::vector<Part>& a, const std::vector<Part>& b) {
   });
 }
 
-/// The maps that the target asks for. What they lose beside seams, where one chart ends and the next has not
-/// begun, shows only between parts: as long as the error of the whole exceeds the target, and finer maps
-/// lower it enough, they are drawn for a stricter one.
+/// The smallest maps that meet the aims, by drawing them for stricter and looser targets than is asked. What
+/// they lose beside seams, where one chart ends and the next has not begun, shows only between parts, so each
+/// drawing is judged as a whole. Where finer maps do not lower the error enough, the last that did.
 Result<Drawn> draw_maps(Asset& asset, MapDrawer& drawer, std::size_t most_shapes, const MeshQueries& queries,
                         const MapTarget& target, std::uint64_t seed) {
-  const ShellPoints shell = sample_shell(queries, kShellWidth * asset.r_max_m, kShellPoints, seed);
-  std::vector<Part> first, best;
+  const Shells shells{sample_shell(queries, kShellWidth * asset.r_max_m, kShellPoints, seed),
+                      sample_shell(queries, kNarrowShellWidth * asset.r_max_m, kShellPoints, seed + 1)};
+  std::vector<Part> best, coarser;
   Shortfall least;
   bool by_budget = false;
   MapTarget asked = target;
   double share = 1;  // of the target before
+  double met_m = 0, failed_m = kLoosest * target.error_m;
   for (int round = 0; round < kMapRounds; ++round) {
     bool budget_decided = drawer.draw(asset.parts, asked, most_shapes);
+    const bool had_met = met_m > 0;
     // Maps come in steps: on, down to a target that asks for others.
     const double step = share;
-    for (int k = 0; k < kMostSteps && round > 0 && have_same_texels(asset.parts, best); ++k) {
+    for (int k = 0; k < kMostSteps && round > 0 && !had_met && have_same_texels(asset.parts, best); ++k) {
       asked.error_m *= step;
       share *= step;
       budget_decided = drawer.draw(asset.parts, asked, most_shapes);
@@ -281,26 +295,40 @@ Result<Drawn> draw_maps(Asset& asset, MapDrawer& drawer, std::size_t most_shapes
     tbb::parallel_for(std::size_t{0}, asset.parts.size(), [&](std::size_t k) {
       add_vertex_samples(asset.parts[k], queries, kVertexTolerance * target.error_m);
     });
-    const auto judged = judge(asset, shell, target.error_m);
+    const auto judged = judge(asset, shells, target.error_m);
     if (!judged) return judged.error();
     const Shortfall& now = judged.value();
-    if (round == 0) first = asset.parts;
+    const bool meets = now.worse() <= 1;
     const auto gains = [share](double here, double before) {
       return before > 1 && here <= (1 - kWorthFinerMaps * (1 - share)) * before;
     };
-    if (round > 0 && !gains(now.depth, least.depth) && !gains(now.sides, least.sides)) break;
-    least = now;
-    best = asset.parts;
-    by_budget = budget_decided;
-    if (by_budget || now.worse() <= 1) break;
-    share = std::max(kMostStricter,
-                     kLeastStricter / std::sqrt(now.worse()));  // errors fall faster than their target
-    asked.error_m *= share;
+    const bool is_better = had_met
+                               ? meets && now.bytes < least.bytes
+                               : round == 0 || gains(now.depth, least.depth) || gains(now.sides, least.sides);
+    if (!had_met && !is_better) break;
+    if (is_better) {
+      if (!had_met) coarser = std::move(best);
+      best = asset.parts;
+      least = now;
+      by_budget = budget_decided;
+    } else if (!meets) {
+      coarser = asset.parts;
+    }
+    if (by_budget) break;
+    const double here_m = asked.error_m;
+    (meets ? met_m : failed_m) = here_m;
+    // Errors fall faster than their target.
+    const double by = 1 / std::sqrt(now.worse());
+    asked.error_m *= meets ? by : std::max(kMostStricter, kLeastStricter * by);
+    const double between_m = std::sqrt(met_m * failed_m);
+    asked.error_m = meets ? std::min(asked.error_m, between_m) : std::max(asked.error_m, between_m);
+    share = asked.error_m / here_m;
+    if (met_m > 0 && (least.bytes <= kSmallEnough || std::abs(share - 1) < kSameTarget)) break;
   }
   asset.parts = std::move(best);
   asset.sphere = enclosing_sphere(asset.parts);
-  if (by_budget) return Drawn{least.depth, by_budget, least.bytes};
-  auto given = give_back(asset, least, first, shell, target.error_m);
+  if (by_budget || coarser.empty()) return Drawn{least.depth, by_budget, least.bytes};
+  auto given = give_back(asset, least, coarser, shells, target.error_m);
   if (!given) return given.error();
   return Drawn{given.value().depth, by_budget, given.value().bytes};
 }
