@@ -328,7 +328,8 @@ TEST(Bake, KeepsToTheNumberOfPartsWhateverTheNumberOfComponents) {
   for (int i = 0; i < 1200; ++i) {
     const Mesh ball = test::sphere(0.3, 0);
     const auto first = static_cast<std::uint32_t>(balls.vertices_m.size());
-    const Vec3d centre{static_cast<double>(i / 2), i % 2 == 0 ? 0.0 : 5000.0, 0};
+    const int place = i / 2;
+    const Vec3d centre{static_cast<double>(place), i % 2 == 0 ? 0.0 : 5000.0, 0};
     for (const Vec3d& p : ball.vertices_m) balls.vertices_m.push_back(p + centre);
     for (const auto& f : ball.faces) balls.faces.push_back({first + f[0], first + f[1], first + f[2]});
   }
