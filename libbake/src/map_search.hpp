@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "sqmap/asset/asset.hpp"
+#include "sqmap/asset/result.hpp"
+
+#include "map_budget.hpp"
+#include "map_builder.hpp"
+
+namespace sqmap::bake {
+
+struct Drawn {
+  double depth_in_aims;  ///< mean error of distances near the surface, over what it may be
+  bool by_budget;        ///< the byte budget decided
+  std::size_t bytes;     ///< of the object in memory
+};
+
+/// The smallest maps that meet the aims, by drawing them for stricter and looser targets than is asked. What
+/// they lose beside seams, where one chart ends and the next has not begun, shows only between parts, so each
+/// drawing is judged as a whole. Where finer maps do not lower the error enough, the last that did.
+/// `most_shapes`: as of MapDrawer::draw. Errors: those of runtime::Object::build.
+Result<Drawn> draw_maps(Asset& asset, MapDrawer& drawer, std::size_t most_shapes, const MeshQueries& queries,
+                        const MapTarget& target, std::uint64_t seed);
+
+}  // namespace sqmap::bake
