@@ -307,7 +307,7 @@ Result<BakeResult> bake(const SourceMesh& source, const BakeOptions& asked, cons
   for (const Piece& piece : pieces) areas_m2.push_back(piece.area_m2);
   auto drawn = draw_smallest(asset, pieces, areas_m2, queries, target, options.seed);
   if (!drawn) return drawn.error();
-  if (result.stopped_by == "target" && !drawn.value().by_budget && drawn.value().depth_in_aims > 1) {
+  if (result.stopped_by == "target" && !drawn.value().by_budget && drawn.value().depth_in_aims > kAtAims) {
     Asset quick = with_quick_fits(asset, pieces);
     auto redrawn = draw_smallest(quick, pieces, areas_m2, queries, target, options.seed);
     if (!redrawn) return redrawn.error();

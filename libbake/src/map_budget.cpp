@@ -27,6 +27,9 @@ constexpr double kInterpolationShare = 1.6;
 constexpr double kOccupancyShare = 1.12;
 // A uniform quantiser of step q errs by q/4 on average.
 constexpr double kStepShare = 1.0;
+constexpr std::uint32_t kMostBits = 16;
+// Texels without a crossing deflate to almost nothing, the others to some three quarters.
+constexpr double kStoredShare = 0.75;
 
 /// Cells a quadrant along each direction of a field.
 struct Quadrant {
@@ -115,16 +118,16 @@ class Allotment {
     for (std::size_t k = 0; k < choices.size(); ++k) sum += weights_[k] * choices[k].error_m;
     return sum;
   }
-  /// In the file: texels without a crossing deflate to almost nothing, the others to some three quarters.
+  /// In the file.
   double stored_bytes(const std::vector<Choice>& choices) const {
     double sum = 0;
     for (std::size_t k = 0; k < choices.size(); ++k)
-      sum += 0.75 * candidates_[k][choices[k].candidate].hit_share * choices[k].bytes;
+      sum += kStoredShare * candidates_[k][choices[k].candidate].hit_share * choices[k].bytes;
     return sum;
   }
   std::uint32_t bits(const Candidate& candidate) const {
     const double codes = candidate.deepest_m / (kStepShare * target_m_) + 2;
-    return static_cast<std::uint32_t>(std::clamp(std::ceil(std::log2(codes)), 4.0, 16.0));
+    return static_cast<std::uint32_t>(std::clamp(std::ceil(std::log2(codes)), 4.0, double(kMostBits)));
   }
   /// The price at which `fits(choices)` changes. `fits` holds at all prices below it, or at all above.
   template <class Fits>
@@ -169,6 +172,15 @@ class Allotment {
 };
 
 }  // namespace
+
+double stored_bytes(const std::vector<Part>& parts) {
+  double bits = 0;
+  for (const Part& part : parts) {
+    const auto misses = std::ranges::count(part.map.code, part.map.miss_code());
+    bits += part.map.bits * double(static_cast<std::ptrdiff_t>(part.map.code.size()) - misses);
+  }
+  return kStoredShare * bits / 8;
+}
 
 struct MapDrawer::Impl {
   const MeshQueries& queries;
@@ -241,6 +253,30 @@ bool MapDrawer::draw(std::vector<Part>& parts, const MapTarget& target, std::siz
         quantise(c.field, {c.rows[choices[k].row].stride, c.cols[choices[k].col].stride, allotment.bits(c)});
   });
   return by_budget;
+}
+
+std::vector<DistanceMap> MapDrawer::finer(std::size_t k, const Part& part) const {
+  std::vector<DistanceMap> maps;
+  const auto of_shape = [&](const Candidate& c) { return c.cells && c.placed.shape == part.shape; };
+  const auto& candidates = impl_->candidates[k];
+  const auto candidate = std::ranges::find_if(candidates, of_shape);
+  if (candidate == candidates.end()) return maps;
+  const RayField& field = candidate->field;
+  const std::uint32_t row_stride = (field.rows - 1) / (part.map.rows - 1);
+  const std::uint32_t col_stride = field.cols / part.map.cols;
+  // Strides ascend.
+  const auto next = [](const std::vector<Strided>& strides, std::uint32_t stride) {
+    std::uint32_t below = stride;
+    for (const Strided& s : strides)
+      if (s.stride < stride) below = s.stride;
+    return below;
+  };
+  const std::uint32_t finer_rows = next(candidate->rows, row_stride);
+  const std::uint32_t finer_cols = next(candidate->cols, col_stride);
+  if (finer_rows < row_stride) maps.push_back(quantise(field, {finer_rows, col_stride, part.map.bits}));
+  if (finer_cols < col_stride) maps.push_back(quantise(field, {row_stride, finer_cols, part.map.bits}));
+  if (part.map.bits < kMostBits) maps.push_back(quantise(field, {row_stride, col_stride, part.map.bits + 1}));
+  return maps;
 }
 
 }  // namespace sqmap::bake

@@ -23,6 +23,9 @@ struct MapTarget {
   std::uint64_t max_bytes;  ///< of all maps in the file, about
 };
 
+/// Of the maps in a file, about.
+double stored_bytes(const std::vector<Part>& parts);
+
 /// Draws the maps of all parts of an asset, for one target after the other: what rays met is kept.
 class MapDrawer {
  public:
@@ -38,6 +41,10 @@ class MapDrawer {
   /// multiplier for all parts): a large smooth part may err more than the target so that a small rough one
   /// need not cost much, or the other way round. True: the byte budget, not the target, decided.
   bool draw(std::vector<Part>& parts, const MapTarget& target, std::size_t most_shapes);
+
+  /// The next finer maps that rays are at hand for, of a part with a map that draw() gave part k: in rows, in
+  /// columns, in bits.
+  std::vector<DistanceMap> finer(std::size_t k, const Part& part) const;
 
  private:
   struct Impl;

@@ -41,12 +41,19 @@ constexpr double kDepthAim = 0.97, kWrongSides = 11.2, kWrongSidesNear = 58;
 constexpr double kGivenBack = 0.98;
 // Less than this share of all texels is not worth the question.
 constexpr double kLeastGivenBack = 0.003;
+// Maps that miss their aims by more than this factor are not sharpened, and others only as long as so many
+// assets are judged for it.
+constexpr double kNearAims = 5;
+constexpr std::size_t kMostTrials = 120;
+// Of the gain foretold for a finer map where others have become finer before it.
+constexpr double kWorthSharpening = 0.5;
 
 /// Errors of an asset, near the surface, over what its target allows: at most 1 where they meet it.
 struct Shortfall {
   double depth{}, sides{};
   std::size_t bytes{};  ///< of the object in memory
   double worse() const { return std::max(depth, sides); }
+  double excess() const { return std::max(0.0, depth - 1) + std::max(0.0, sides - 1); }
 };
 
 /// Points near the surface that maps are judged by.
@@ -94,6 +101,65 @@ Result<Shortfall> give_back(Asset& asset, Shortfall now, const std::vector<Part>
     }
   }
   asset.sphere = enclosing_sphere(asset.parts);
+  return now;
+}
+
+/// One finer map, and what it does.
+struct Sharper {
+  std::size_t part;
+  DistanceMap map;
+  double gain, bytes;  ///< of Shortfall::excess, in memory
+};
+
+/// What each finer map of a part does alone; best first, by gain a byte, without those that gain nothing.
+std::vector<Sharper> sharper_maps(const Asset& asset, const Shortfall& now, const MapDrawer& drawer,
+                                  const MeshQueries& queries, const Shells& shells, double target_m) {
+  std::vector<Sharper> maps;
+  for (std::size_t k = 0; k < asset.parts.size(); ++k)
+    for (DistanceMap& map : drawer.finer(k, asset.parts[k])) maps.push_back({k, std::move(map), 0, 0});
+  tbb::parallel_for(std::size_t{0}, maps.size(), [&](std::size_t i) {
+    Asset other = asset;
+    Part& part = other.parts[maps[i].part];
+    part.map = maps[i].map;
+    add_vertex_samples(part, queries, kVertexTolerance * target_m);
+    maps[i].map = part.map;
+    const auto then = judge(other, shells, target_m);
+    if (!then) return;
+    maps[i].gain = now.excess() - then.value().excess();
+    maps[i].bytes = std::max(1.0, double(then.value().bytes) - double(now.bytes));
+  });
+  std::erase_if(maps, [](const Sharper& s) { return !(s.gain > 0); });
+  std::ranges::stable_sort(
+      maps, [](const Sharper& a, const Sharper& b) { return a.gain * b.bytes > b.gain * a.bytes; });
+  return maps;
+}
+
+/// Where errors are still beyond their aims, makes single maps finer within the byte budget, those first that
+/// gain most a byte: all were drawn by what is foretold of them, which is wrong of some.
+Result<Shortfall> sharpen(Asset& asset, Shortfall now, const MapDrawer& drawer, const MeshQueries& queries,
+                          const Shells& shells, const MapTarget& target) {
+  std::size_t trials = 0;
+  while (now.worse() > kAtAims && now.worse() <= kNearAims && trials < kMostTrials) {
+    std::vector<Sharper> sharper = sharper_maps(asset, now, drawer, queries, shells, target.error_m);
+    trials += 3 * asset.parts.size();
+    std::vector<bool> changed(asset.parts.size());
+    const double before = now.excess();
+    for (Sharper& s : sharper) {
+      if (changed[s.part] || now.worse() <= 1) continue;
+      std::swap(asset.parts[s.part].map, s.map);
+      const auto then = judge(asset, shells, target.error_m);
+      if (!then) return then.error();
+      ++trials;
+      const bool in_budget = stored_bytes(asset.parts) <= static_cast<double>(target.max_bytes);
+      if (in_budget && now.excess() - then.value().excess() >= kWorthSharpening * s.gain) {
+        now = then.value();
+        changed[s.part] = true;
+      } else {
+        std::swap(asset.parts[s.part].map, s.map);
+      }
+    }
+    if (!(now.excess() < before)) break;
+  }
   return now;
 }
 
@@ -162,6 +228,11 @@ Result<Drawn> draw_maps(Asset& asset, MapDrawer& drawer, std::size_t most_shapes
   }
   asset.parts = std::move(best);
   asset.sphere = enclosing_sphere(asset.parts);
+  if (!by_budget && met_m == 0) {
+    auto sharpened = sharpen(asset, least, drawer, queries, shells, target);
+    if (!sharpened) return sharpened.error();
+    return Drawn{sharpened.value().depth, by_budget, sharpened.value().bytes};
+  }
   if (by_budget || coarser.empty()) return Drawn{least.depth, by_budget, least.bytes};
   auto given = give_back(asset, least, coarser, shells, target.error_m);
   if (!given) return given.error();

@@ -12,6 +12,9 @@
 
 namespace sqmap::bake {
 
+/// Errors that exceed their aims by less are at them: points at random do not tell better.
+inline constexpr double kAtAims = 1.02;
+
 struct Drawn {
   double depth_in_aims;  ///< mean error of distances near the surface, over what it may be
   bool by_budget;        ///< the byte budget decided

@@ -225,6 +225,13 @@ TEST(Bake, AsksForFinerMapsUntilTheyAreFiner) {
   EXPECT_LT(finest(result.value().asset, 3).depth_mean_percent, 0.25);  // with the first maps 0.56
 }
 
+TEST(Bake, SharpensSingleMapsWhereDrawingAllFinerDoesNotHelp) {
+  // What a stricter target asks for are columns along the sheet; its rim needs rows.
+  auto result = bake(test::as_source(test::thin_sheet(1, 0.01)), {});
+  ASSERT_TRUE(result.ok());
+  EXPECT_LT(finest(result.value().asset, 3).depth_mean_percent, 0.06);  // otherwise 0.116
+}
+
 #ifdef SQMAP_MESH_DIR
 /// A mesh of libcgal-demo, if it is here.
 std::optional<BakeResult> bake_sample(const std::string& name) {
