@@ -257,9 +257,12 @@ bool MapDrawer::draw(std::vector<Part>& parts, const MapTarget& target, std::siz
 
 std::vector<DistanceMap> MapDrawer::finer(std::size_t k, const Part& part) const {
   std::vector<DistanceMap> maps;
-  const auto of_shape = [&](const Candidate& c) { return c.cells && c.placed.shape == part.shape; };
+  const auto has_drawn = [&](const Candidate& c) {
+    return c.cells && c.placed.shape == part.shape && c.placed.object_from_part == part.object_from_part &&
+           (c.field.rows - 1) % (part.map.rows - 1) == 0 && c.field.cols % part.map.cols == 0;
+  };
   const auto& candidates = impl_->candidates[k];
-  const auto candidate = std::ranges::find_if(candidates, of_shape);
+  const auto candidate = std::ranges::find_if(candidates, has_drawn);
   if (candidate == candidates.end()) return maps;
   const RayField& field = candidate->field;
   const std::uint32_t row_stride = (field.rows - 1) / (part.map.rows - 1);

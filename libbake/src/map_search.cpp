@@ -3,11 +3,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <numeric>
 #include <utility>
 #include <vector>
 
 #include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
 
 #include "sqmap/runtime/object.hpp"
 
@@ -44,7 +46,7 @@ constexpr double kLeastGivenBack = 0.003;
 // Maps that miss their aims by more than this factor are not sharpened, and others only as long as so many
 // assets are judged for it.
 constexpr double kNearAims = 5;
-constexpr std::size_t kMostTrials = 120;
+constexpr std::size_t kMostTrials = 160;
 // Of the gain foretold for a finer map where others have become finer before it.
 constexpr double kWorthSharpening = 0.5;
 
@@ -108,7 +110,7 @@ Result<Shortfall> give_back(Asset& asset, Shortfall now, const std::vector<Part>
 struct Sharper {
   std::size_t part;
   DistanceMap map;
-  double gain, bytes;  ///< of Shortfall::excess, in memory
+  double gain, per_byte;  ///< of Shortfall::excess
 };
 
 /// What each finer map of a part does alone; best first, by gain a byte, without those that gain nothing.
@@ -123,35 +125,42 @@ std::vector<Sharper> sharper_maps(const Asset& asset, const Shortfall& now, cons
     part.map = maps[i].map;
     add_vertex_samples(part, queries, kVertexTolerance * target_m);
     maps[i].map = part.map;
-    const auto then = judge(other, shells, target_m);
+    // Isolated: while this waits for its own points, it must not begin with another map and its asset.
+    const auto then = tbb::this_task_arena::isolate([&] { return judge(other, shells, target_m); });
     if (!then) return;
     maps[i].gain = now.excess() - then.value().excess();
-    maps[i].bytes = std::max(1.0, double(then.value().bytes) - double(now.bytes));
+    maps[i].per_byte = maps[i].gain / std::max(1.0, double(then.value().bytes) - double(now.bytes));
   });
   std::erase_if(maps, [](const Sharper& s) { return !(s.gain > 0); });
-  std::ranges::stable_sort(
-      maps, [](const Sharper& a, const Sharper& b) { return a.gain * b.bytes > b.gain * a.bytes; });
+  std::ranges::stable_sort(maps, std::greater{}, &Sharper::per_byte);
   return maps;
 }
 
 /// Where errors are still beyond their aims, makes single maps finer within the byte budget, those first that
 /// gain most a byte: all were drawn by what is foretold of them, which is wrong of some.
-Result<Shortfall> sharpen(Asset& asset, Shortfall now, const MapDrawer& drawer, const MeshQueries& queries,
-                          const Shells& shells, const MapTarget& target) {
+Result<Drawn> sharpen(Asset& asset, Shortfall now, const MapDrawer& drawer, const MeshQueries& queries,
+                      const Shells& shells, const MapTarget& target) {
   std::size_t trials = 0;
-  while (now.worse() > kAtAims && now.worse() <= kNearAims && trials < kMostTrials) {
+  bool over_budget = false;
+  const std::size_t sweep = 3 * asset.parts.size();
+  while (now.worse() > kAtAims && now.worse() <= kNearAims && trials + sweep <= kMostTrials) {
     std::vector<Sharper> sharper = sharper_maps(asset, now, drawer, queries, shells, target.error_m);
-    trials += 3 * asset.parts.size();
+    trials += sweep;
     std::vector<bool> changed(asset.parts.size());
     const double before = now.excess();
     for (Sharper& s : sharper) {
-      if (changed[s.part] || now.worse() <= 1) continue;
+      if (changed[s.part] || now.worse() <= 1 || trials >= kMostTrials) continue;
       std::swap(asset.parts[s.part].map, s.map);
+      if (stored_bytes(asset.parts) > static_cast<double>(target.max_bytes)) {
+        std::swap(asset.parts[s.part].map, s.map);
+        over_budget = true;
+        continue;
+      }
       const auto then = judge(asset, shells, target.error_m);
       if (!then) return then.error();
       ++trials;
-      const bool in_budget = stored_bytes(asset.parts) <= static_cast<double>(target.max_bytes);
-      if (in_budget && now.excess() - then.value().excess() >= kWorthSharpening * s.gain) {
+      const double gain = now.excess() - then.value().excess();
+      if (gain >= kWorthSharpening * std::min(s.gain, now.excess())) {
         now = then.value();
         changed[s.part] = true;
       } else {
@@ -160,7 +169,7 @@ Result<Shortfall> sharpen(Asset& asset, Shortfall now, const MapDrawer& drawer, 
     }
     if (!(now.excess() < before)) break;
   }
-  return now;
+  return Drawn{now.depth, over_budget && now.worse() > kAtAims, now.bytes};
 }
 
 bool have_same_texels(const std::vector<Part>& a, const std::vector<Part>& b) {
@@ -203,9 +212,9 @@ Result<Drawn> draw_maps(Asset& asset, MapDrawer& drawer, std::size_t most_shapes
     const auto gains = [share](double here, double before) {
       return before > 1 && here <= (1 - kWorthFinerMaps * (1 - share)) * before;
     };
-    const bool is_better = had_met
-                               ? meets && now.bytes < least.bytes
-                               : round == 0 || gains(now.depth, least.depth) || gains(now.sides, least.sides);
+    const bool is_better =
+        had_met ? meets && now.bytes < least.bytes
+                : round == 0 || meets || gains(now.depth, least.depth) || gains(now.sides, least.sides);
     if (!had_met && !is_better) break;
     if (is_better) {
       if (!had_met) coarser = std::move(best);
@@ -215,7 +224,7 @@ Result<Drawn> draw_maps(Asset& asset, MapDrawer& drawer, std::size_t most_shapes
     } else if (!meets) {
       coarser = asset.parts;
     }
-    if (by_budget) break;
+    if (by_budget && !meets) break;
     const double here_m = asked.error_m;
     (meets ? met_m : failed_m) = here_m;
     // Errors fall faster than their target.
@@ -228,11 +237,7 @@ Result<Drawn> draw_maps(Asset& asset, MapDrawer& drawer, std::size_t most_shapes
   }
   asset.parts = std::move(best);
   asset.sphere = enclosing_sphere(asset.parts);
-  if (!by_budget && met_m == 0) {
-    auto sharpened = sharpen(asset, least, drawer, queries, shells, target);
-    if (!sharpened) return sharpened.error();
-    return Drawn{sharpened.value().depth, by_budget, sharpened.value().bytes};
-  }
+  if (!by_budget && met_m == 0) return sharpen(asset, least, drawer, queries, shells, target);
   if (by_budget || coarser.empty()) return Drawn{least.depth, by_budget, least.bytes};
   auto given = give_back(asset, least, coarser, shells, target.error_m);
   if (!given) return given.error();

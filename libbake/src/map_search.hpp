@@ -21,10 +21,11 @@ struct Drawn {
   std::size_t bytes;     ///< of the object in memory
 };
 
-/// The smallest maps that meet the aims, by drawing them for stricter and looser targets than is asked. What
-/// they lose beside seams, where one chart ends and the next has not begun, shows only between parts, so each
-/// drawing is judged as a whole. Where finer maps do not lower the error enough, the last that did.
-/// `most_shapes`: as of MapDrawer::draw. Errors: those of runtime::Object::build.
+/// Maps that meet the aims and, beyond 64 KB of an object, no finer ones than that takes, by drawing them for
+/// stricter and looser targets than is asked. What they lose beside seams, where one chart ends and the next
+/// has not begun, shows only between parts, so each drawing is judged as a whole. Where finer maps do not
+/// lower the error enough, the last that did, and single ones of them finer. `most_shapes`: as of
+/// MapDrawer::draw. Errors: those of runtime::Object::build.
 Result<Drawn> draw_maps(Asset& asset, MapDrawer& drawer, std::size_t most_shapes, const MeshQueries& queries,
                         const MapTarget& target, std::uint64_t seed);
 

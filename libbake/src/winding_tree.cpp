@@ -25,6 +25,8 @@ constexpr double kRoughError = 0.12;
 /// takes the mean query on a machine of long slivers from 36 to 6 us.
 constexpr double kLongEdge = 1.0 / 32;
 constexpr std::size_t kMostPieces = 2;
+/// Not at the middle: the median holds the centroid, where repair asks of faces that touch.
+constexpr double kCutAt = 0.4375;
 
 /// Squared distance, in sizes of the mesh, from where nothing is seen of it; keeps powers of it in range.
 constexpr double kGone = 1e60;
@@ -111,8 +113,8 @@ struct LongTriangle {
   }
 };
 
-/// Halves long triangles at the middles of their longest edges, in place and at the end. The surface stays as
-/// it is, and so does its winding number.
+/// Cuts long triangles in two at about the middles of their longest edges, in place and at the end. The
+/// surface stays as it is, and so does its winding number.
 void cut_long(std::vector<std::array<Vec3d, 3>>& triangles) {
   std::priority_queue<LongTriangle> queue;
   const auto push = [&](std::size_t i) {
@@ -129,7 +131,7 @@ void cut_long(std::vector<std::array<Vec3d, 3>>& triangles) {
     const auto [square, i, k] = queue.top();
     queue.pop();
     const std::size_t next = (k + 1) % 3;
-    const Vec3d middle = 0.5 * (triangles[i][k] + triangles[i][next]);
+    const Vec3d middle = (1 - kCutAt) * triangles[i][k] + kCutAt * triangles[i][next];
     std::array<Vec3d, 3> other = triangles[i];
     other[k] = triangles[i][next] = middle;
     triangles.push_back(other);
