@@ -209,12 +209,14 @@ Result<Drawn> draw_smallest(Asset& asset, const std::vector<Piece>& pieces,
                             const MapTarget& target, std::uint64_t seed) {
   const std::vector<std::vector<PlacedShape>> shapes = shapes_of(asset, pieces);
   MapDrawer drawer(shapes, areas_m2, queries);
-  auto drawn = draw_maps(asset, drawer, 1, queries, target, seed);
+  auto drawn = draw_maps(asset, drawer, 1, queries, target, kSmallEnough, seed);
   const bool have_tapers =
       std::any_of(shapes.begin(), shapes.end(), [](const auto& s) { return s.size() > 1; });
   if (!drawn || !have_tapers) return drawn;
   Asset other = asset;
-  auto redrawn = draw_maps(other, drawer, 2, queries, target, seed);
+  // Tapers are to save memory, but not at the price of what exactness small objects have.
+  const std::size_t fewer = std::clamp(drawn.value().bytes, kSmallEnough / 2, kSmallEnough);
+  auto redrawn = draw_maps(other, drawer, 2, queries, target, fewer, seed);
   if (!redrawn) return redrawn;
   const Drawn &rigid = drawn.value(), &tapered = redrawn.value();
   const bool meets = tapered.depth_in_aims <= std::max(rigid.depth_in_aims, 1.0);

@@ -36,7 +36,6 @@ constexpr double kMostStricter = 0.4, kLeastStricter = 0.97;
 constexpr double kWorthFinerMaps = 0.2;
 constexpr int kMostSteps = 8;  // down to a target that asks for other maps
 constexpr double kLoosest = 4, kSameTarget = 0.01;
-constexpr std::size_t kSmallEnough = 65536;  // bytes; fits in the second cache beside others
 constexpr double kDepthAim = 0.97, kWrongSides = 11.2, kWrongSidesNear = 58;
 // Parts are given coarser maps back up to this share of the aims: chosen by the points that judge it, they
 // do a little worse at others.
@@ -182,7 +181,7 @@ bool have_same_texels(const std::vector<Part>& a, const std::vector<Part>& b) {
 }  // namespace
 
 Result<Drawn> draw_maps(Asset& asset, MapDrawer& drawer, std::size_t most_shapes, const MeshQueries& queries,
-                        const MapTarget& target, std::uint64_t seed) {
+                        const MapTarget& target, std::size_t small_enough, std::uint64_t seed) {
   const Shells shells{sample_shell(queries, kShellWidth * asset.r_max_m, kShellPoints, seed),
                       sample_shell(queries, kNarrowShellWidth * asset.r_max_m, kShellPoints, seed + 1)};
   std::vector<Part> best, coarser;
@@ -233,7 +232,7 @@ Result<Drawn> draw_maps(Asset& asset, MapDrawer& drawer, std::size_t most_shapes
     const double between_m = std::sqrt(met_m * failed_m);
     asked.error_m = meets ? std::min(asked.error_m, between_m) : std::max(asked.error_m, between_m);
     share = asked.error_m / here_m;
-    if (met_m > 0 && (least.bytes <= kSmallEnough || std::abs(share - 1) < kSameTarget)) break;
+    if (met_m > 0 && (least.bytes <= small_enough || std::abs(share - 1) < kSameTarget)) break;
   }
   asset.parts = std::move(best);
   asset.sphere = enclosing_sphere(asset.parts);
