@@ -219,7 +219,7 @@ Result<Drawn> draw_smallest(Asset& asset, const std::vector<Piece>& pieces,
   auto redrawn = draw_maps(other, drawer, 2, queries, target, fewer, seed);
   if (!redrawn) return redrawn;
   const Drawn &rigid = drawn.value(), &tapered = redrawn.value();
-  const bool meets = tapered.depth_in_aims <= std::max(rigid.depth_in_aims, 1.0);
+  const bool meets = tapered.depth_in_aims <= std::max(rigid.depth_in_aims, kAtAims);
   // Where the budget decides, bytes are the same and errors differ.
   const bool gains = rigid.by_budget ? tapered.depth_in_aims < rigid.depth_in_aims
                                      : !tapered.by_budget && tapered.bytes < rigid.bytes;
