@@ -4,9 +4,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <limits>
 #include <numbers>
-#include <numeric>
 #include <sstream>
 
 #include <tbb/parallel_for.h>

@@ -21,8 +21,9 @@ constexpr double kRoughRadii = 1.2;
 constexpr double kRoughError = 0.12;
 
 /// A long triangle makes its nodes wide, so that they count as far from few points. Those with an edge above
-/// this share of the mesh's size are cut, the longest first, until there are kMostPieces times as many; it
-/// takes the mean query on a machine of long slivers from 36 to 6 us.
+/// this share of the mesh's size are cut, the longest first, until there are kMostPieces times as many:
+/// 2CylinderEngine.glb of assimp-testmodels, whose rounds are slivers, bakes in 24 s for 92 (sqbake bake -v
+/// --max-error 0.2% --max-parts 12).
 constexpr double kLongEdge = 1.0 / 32;
 constexpr std::size_t kMostPieces = 2;
 /// Not at the middle: the median holds the centroid, where repair asks of faces that touch.
