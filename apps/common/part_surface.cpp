@@ -90,7 +90,8 @@ class LevelGrid {
         stride_(1U << std::min(level, part.map.level_count - 1)),
         rows_((part.map.rows - 1) / stride_ + 1),
         cols_(part.map.cols / stride_),
-        grid_(part.shape, rows_, cols_) {}
+        bend_(part.shape.bend),
+        grid_(straight(part.shape), rows_, cols_) {}
 
   std::uint32_t rows() const noexcept { return rows_; }
   std::uint32_t cols() const noexcept { return cols_; }
@@ -113,8 +114,9 @@ class LevelGrid {
       const std::uint32_t r = row + k / 2, c = (col + (k == 1 || k == 2 ? 1 : 0)) % cols_;
       const std::uint32_t node = texel(r, c);
       if (map_.code[node] == map_.miss_code() || map_.starts_inside(node)) return false;
-      base[k] = grid_.point(r, c);
-      drawn[k] = base[k] - depth_m(r, c) * grid_.normal(r, c);
+      const Vec3d p = grid_.point(r, c);
+      base[k] = bent(bend_, p);
+      drawn[k] = bent(bend_, p - depth_m(r, c) * grid_.normal(r, c));
     }
     return longest_edge_m(drawn) <= kMaxStretch * longest_edge_m(base);
   }
@@ -126,6 +128,7 @@ class LevelGrid {
 
   const DistanceMap& map_;
   std::uint32_t stride_, rows_, cols_;
+  Bend<double> bend_;
   MapGrid grid_;
 };
 
@@ -147,7 +150,8 @@ TriangleSurface mapped_surface(const Part& part, std::uint32_t level) {
   // lengths make every node of the map a node of that grid, too.
   const std::uint32_t row_steps = (kDrawnRows - 2) / (map.rows() - 1) + 1,
                       col_steps = (kDrawnCols - 1) / map.cols() + 1;
-  const MapGrid grid(part.shape, (map.rows() - 1) * row_steps + 1, map.cols() * col_steps);
+  const Bend<double>& bend = part.shape.bend;
+  const MapGrid grid(straight(part.shape), (map.rows() - 1) * row_steps + 1, map.cols() * col_steps);
   std::vector<GridNode> nodes;
   nodes.reserve(std::size_t{grid.rows()} * grid.cols());
   for (std::uint32_t row = 0; row < grid.rows(); ++row) {
@@ -155,8 +159,8 @@ TriangleSurface mapped_surface(const Part& part, std::uint32_t level) {
       const double depth_m =
           map.depth_m(row / row_steps, col / col_steps, static_cast<double>(row % row_steps) / row_steps,
                       static_cast<double>(col % col_steps) / col_steps);
-      const Vec3d normal = grid.normal(row, col);
-      nodes.push_back({grid.point(row, col) - depth_m * normal, normal});
+      const Vec3d normal = grid.normal(row, col), p = grid.point(row, col) - depth_m * normal;
+      nodes.push_back({bent(bend, p), normalized(turned(bend, p, normal))});
     }
   }
   std::vector<bool> is_drawn;

@@ -28,6 +28,9 @@ class Comparison {
   }
   void plain(const char* what, double a, double b) { number(what, a, b, 1); }
   void length(const char* what, double a_m, double b_m) { number(what, a_m, b_m, length_m_); }
+  void curvature(const char* what, double a_per_m, double b_per_m) {
+    number(what, a_per_m, b_per_m, 1 / length_m_);
+  }
   void volume(const char* what, double a_m3, double b_m3) {
     number(what, a_m3, b_m3, std::pow(length_m_, 3));
   }
@@ -131,6 +134,8 @@ void compare_parts(Comparison& compare, const Part& a, const Part& b) {
   compare.plain("e1", a.shape.e1, b.shape.e1);
   compare.plain("e2", a.shape.e2, b.shape.e2);
   compare.plain("taper", a.shape.taper, b.shape.taper);
+  compare.curvature("bend_per_m x", a.shape.bend.x, b.shape.bend.x);
+  compare.curvature("bend_per_m y", a.shape.bend.y, b.shape.bend.y);
   compare.orientation(a.object_from_part.orientation, b.object_from_part.orientation);
   compare.point("translation_m", a.object_from_part.translation_m, b.object_from_part.translation_m);
   compare.sphere("sphere", a.sphere, b.sphere);

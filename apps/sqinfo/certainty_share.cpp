@@ -25,7 +25,8 @@ std::optional<CertaintyShare> certainty_share(const Asset& asset, const runtime:
     const double weight = a.x * a.y * a.z;
     const Rotation<double> turn = rotation(part.object_from_part.orientation);
     for (int k = 0; k < kPoints; ++k) {
-      const Vec3d p{a.x * spread(k, kStride.x), a.y * spread(k, kStride.y), a.z * spread(k, kStride.z)};
+      const Vec3d p = bent(part.shape.bend, Vec3d{a.x * spread(k, kStride.x), a.y * spread(k, kStride.y),
+                                                  a.z * spread(k, kStride.z)});
       if (!(inside_outside_radial(part.shape, p) <= 1)) continue;
       const auto told = object.certainty(cast<float>(turn.apply(p) + part.object_from_part.translation_m));
       volume += weight;

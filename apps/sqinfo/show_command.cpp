@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <numbers>
 #include <optional>
 #include <set>
 #include <string>
@@ -65,6 +66,11 @@ Result<BundleFacts> gather(const std::filesystem::path& path) {
 /// Volume of a part over its superquadric's: 1 is a perfect fit.
 double fill(const Part& part) { return part.volume_m3 / volume_m3(part.shape); }
 
+/// By which a bent part's axis turns from end to end.
+double axis_turn_deg(const Superquadric& shape) {
+  return 2 * shape.bend.curvature() * shape.semi_axes_m.z * 180 / std::numbers::pi;
+}
+
 Json to_json(const Vec3d& v) { return Json::array({v.x, v.y, v.z}); }
 
 Json part_json(const Part& part) {
@@ -76,6 +82,7 @@ Json part_json(const Part& part) {
           {"e1", part.shape.e1},
           {"e2", part.shape.e2},
           {"taper", part.shape.taper},
+          {"bend_per_m", Json::array({part.shape.bend.x, part.shape.bend.y})},
           {"orientation_wxyz", Json::array({q.w, q.x, q.y, q.z})},
           {"translation_m", to_json(part.object_from_part.translation_m)},
           {"sphere", {{"centre_m", to_json(part.sphere.centre_m)}, {"radius_m", part.sphere.radius_m}}},
@@ -142,27 +149,30 @@ std::string json_report(const BundleFacts& facts) {
 
 std::string parts_table(const Asset& asset) {
   std::string text = fmt::format(
-      "\nparts: fill is the part's volume over its superquadric's; depths are in % of R_max, over the nodes "
-      "that hit\n"
-      "{:>4} {:>7} {:<17} {:>6} {:>9} {:>9} {:>9} {:>5} {:>5} {:>5} {:>5} {:>9} {:>2} {:>4} {:>6} {:>7} "
+      "\nparts: K tapers, turn is by how many degrees the axis is bent from end to end, fill is the part's "
+      "volume over its superquadric's; depths are in % of R_max, over the nodes that hit\n"
+      "{:>4} {:>7} {:<17} {:>6} {:>9} {:>9} {:>9} {:>5} {:>5} {:>5} {:>4} {:>5} {:>9} {:>2} {:>4} {:>6} "
+      "{:>7} "
       "{:>6} "
       "{:>6} {:>7}\n",
-      "part", "segment", "reason", "faces", "a1 m", "a2 m", "a3 m", "e1", "e2", "K", "fill", "map", "lv",
-      "bits", "miss %", "seam %", "mean %", "max %", "bytes");
+      "part", "segment", "reason", "faces", "a1 m", "a2 m", "a3 m", "e1", "e2", "K", "turn", "fill", "map",
+      "lv", "bits", "miss %", "seam %", "mean %", "max %", "bytes");
   for (std::size_t i = 0; i < asset.parts.size(); ++i) {
     const Part& part = asset.parts[i];
     const MapStatistics map = statistics(part.map);
     const double nodes = static_cast<double>(part.map.code.size());
     text += fmt::format(
-        "{:>4} {:>7} {:<17} {:>6} {:>9.4g} {:>9.4g} {:>9.4g} {:>5.2f} {:>5.2f} {:>5.2f} {:>5.2f} {:>9} {:>2} "
+        "{:>4} {:>7} {:<17} {:>6} {:>9.4g} {:>9.4g} {:>9.4g} {:>5.2f} {:>5.2f} {:>5.2f} {:>4.0f} {:>5.2f} "
+        "{:>9} {:>2} "
         "{:>4} "
         "{:>6.1f} "
         "{:>7.1f} {:>6.2f} {:>6.2f} {:>7}\n",
         i, part.segment, reason_name(part.reason), part.face_count, part.shape.semi_axes_m.x,
         part.shape.semi_axes_m.y, part.shape.semi_axes_m.z, part.shape.e1, part.shape.e2, part.shape.taper,
-        fill(part), fmt::format("{}x{}", part.map.rows, part.map.cols), part.map.level_count, part.map.bits,
-        100 * static_cast<double>(map.misses) / nodes, 100 * static_cast<double>(map.start_inside) / nodes,
-        100 * map.depth_mean_m / asset.r_max_m, 100 * map.depth_most_m / asset.r_max_m, map.packed_bytes);
+        axis_turn_deg(part.shape), fill(part), fmt::format("{}x{}", part.map.rows, part.map.cols),
+        part.map.level_count, part.map.bits, 100 * static_cast<double>(map.misses) / nodes,
+        100 * static_cast<double>(map.start_inside) / nodes, 100 * map.depth_mean_m / asset.r_max_m,
+        100 * map.depth_most_m / asset.r_max_m, map.packed_bytes);
   }
   return text;
 }

@@ -118,6 +118,11 @@ bool has_tapers(const Asset& asset) {
                      [](const Part& part) { return part.shape.taper != 0; });
 }
 
+bool has_bends(const Asset& asset) {
+  return std::any_of(asset.parts.begin(), asset.parts.end(),
+                     [](const Part& part) { return !part.shape.bend.is_none(); });
+}
+
 void put_bounds(Document& document, const SurfaceBounds& bounds) {
   put(document.tables[kBoundCells], bounds.cells);
   put(document.tables[kBoundTolerance], bounds.tolerance_m);
@@ -193,8 +198,10 @@ Outcome check_shapes(const Document& document) {
   for (const TableId id : {kBoundCells, kBoundTolerance})
     if (Outcome same = require_rows(document, id, bounded_parts, "/maps/bound_cells"); !same) return same;
   if (Outcome same = require_rows(document, kBounds, bound_cells, "/maps/bound_cells"); !same) return same;
-  const std::size_t tapers = row_count(document, kTaper) > 0 ? part_count : 0;
-  if (Outcome same = require_rows(document, kTaper, tapers, "/parts/semi_axes_m"); !same) return same;
+  for (const TableId id : {kTaper, kBend}) {
+    const std::size_t rows = row_count(document, id) > 0 ? part_count : 0;
+    if (Outcome same = require_rows(document, id, rows, "/parts/semi_axes_m"); !same) return same;
+  }
 
   const std::pair<TableId, std::uint64_t> required[] = {{kCode, texels},
                                                         {kStartInside, start_bytes},
@@ -275,6 +282,8 @@ Part get_part(const Document& document, std::size_t index) {
   part.shape.e1 = get<double>(tables[kExponents], 2 * index);
   part.shape.e2 = get<double>(tables[kExponents], 2 * index + 1);
   if (!tables[kTaper].empty()) part.shape.taper = get<double>(tables[kTaper], index);
+  if (!tables[kBend].empty())
+    part.shape.bend = {get<double>(tables[kBend], 2 * index), get<double>(tables[kBend], 2 * index + 1)};
   const auto q = [&](std::size_t i) { return get<double>(tables[kOrientation], 4 * index + i); };
   part.object_from_part = {{q(0), q(1), q(2), q(3)}, get_vec3(tables[kTranslation], 3 * index)};
   part.sphere = get_sphere(tables[kPartSphere], 4 * index);
@@ -330,7 +339,7 @@ std::string path_of(const ArraySpec& spec) {
 }
 
 std::uint32_t minor_version(const Asset& asset) noexcept {
-  return has_tapers(asset) ? 2 : has_bounds(asset) ? 1 : 0;
+  return has_bends(asset) ? 3 : has_tapers(asset) ? 2 : has_bounds(asset) ? 1 : 0;
 }
 
 Document to_document(const Asset& asset) {
@@ -350,7 +359,7 @@ Document to_document(const Asset& asset) {
   put(numbers[kMeshVolume], asset.mesh.volume_m3);
 
   auto& tables = document.tables;
-  const bool bounded = has_bounds(asset), tapered = has_tapers(asset);
+  const bool bounded = has_bounds(asset), tapered = has_tapers(asset), bent = has_bends(asset);
   for (const Part& part : asset.parts) {
     put(tables[kSemiAxes], part.shape.semi_axes_m);
     put(tables[kExponents], part.shape.e1);
@@ -367,6 +376,8 @@ Document to_document(const Asset& asset) {
     put_map(document, part.map);
     if (bounded) put_bounds(document, part.bounds);
     if (tapered) put(tables[kTaper], part.shape.taper);
+    if (bent) put(tables[kBend], part.shape.bend.x);
+    if (bent) put(tables[kBend], part.shape.bend.y);
   }
   for (const std::uint16_t label : asset.face_labels) put(tables[kFaceLabels], label);
   for (const ErrorRow& row : asset.errors)

@@ -54,6 +54,7 @@ enum TableId : std::size_t {
   kBoundTolerance,
   kBounds,
   kTaper,
+  kBend,
   kTableCount
 };
 inline constexpr std::array<ArraySpec, kTableCount> kTables{{
@@ -82,6 +83,7 @@ inline constexpr std::array<ArraySpec, kTableCount> kTables{{
     {"maps", "bound_tolerance_m", Element::kF64, 1},
     {"maps", "bounds", Element::kU8, 6},
     {"parts", "taper", Element::kF64, 1},
+    {"parts", "bend_per_m", Element::kF64, 2},
 }};
 
 /// Attributes of numbers, in the order of the content hash.

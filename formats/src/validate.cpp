@@ -174,6 +174,7 @@ class Checker {
       require_part(std::abs(shape.taper) <= max_taper(shape.e1), 29,
                    "taper = " + text(shape.taper) + ", must be within " + text(max_taper(shape.e1)) +
                        " of 0: a superquadric of e1 = " + text(shape.e1) + " is not convex beyond it");
+    check_bend(part);
     const Quaternion& q = part.object_from_part.orientation;
     const double length = std::sqrt(q.w * q.w + q.x * q.x + q.y * q.y + q.z * q.z);
     require_part(in_range(length, 1 - kUnitTolerance, 1 + kUnitTolerance), 22,
@@ -193,12 +194,26 @@ class Checker {
     // radius finite.
     const double reach_m = asset_.sphere.radius_m * (1 + kSphereTolerance);
     const double off_m = norm(part.object_from_part.translation_m - asset_.sphere.centre_m);
+    // What is bent by up to kMostBendTurn spans a ball of half its length.
+    const double half_length_m = shape.semi_axes_m.z / (shape.bend.is_none() ? 1 : kMostBendTurn);
     require_part(off_m <= reach_m && shape.semi_axes_m.x <= reach_m && shape.semi_axes_m.y <= reach_m &&
-                     shape.semi_axes_m.z <= reach_m,
+                     half_length_m <= reach_m,
                  28,
                  "its centre is " + text(off_m) + " m from that of the asset's sphere, its semi-axes are " +
                      text(shape.semi_axes_m) + ", must be at most the sphere's radius of " +
                      text(asset_.sphere.radius_m));
+  }
+
+  void check_bend(const Part& part) {
+    const Bend<double>& bend = part.shape.bend;
+    if (bend.is_none()) return;
+    const double turn = bend.curvature() * part.shape.semi_axes_m.z, reach = bend_reach(part.shape);
+    require_part(in_range(turn, kLeastBendTurn, kMostBendTurn) && reach <= kMostBendReach, 40,
+                 "bend_per_m = (" + text(bend.x) + ", " + text(bend.y) + ") turns the axis by " + text(turn) +
+                     " rad, must be none or " + text(kLeastBendTurn) + " to " + text(kMostBendTurn) +
+                     ", and reaches over " + text(reach) + " of the arc's radius, must be at most " +
+                     text(kMostBendReach));
+    require_part(part.bounds.cells == 0, 40, "a part with bounds has bend_per_m, must be straight");
   }
 
   void check_grid(const DistanceMap& map) {

@@ -152,7 +152,7 @@ HWY_NOINLINE void Answerer::second_layer() noexcept {
     const Looker looker(resident_, part, charts_.of(range.part), options_);
     for (std::uint32_t i = range.begin; i < range.end; i += lane_count()) {
       const Look look = looker.look(load3(entries_.x, entries_.y, entries_.z, i),
-                                    hn::FirstN(kD, range.end - i), wants_.reach);
+                                    hn::FirstN(kD, range.end - i), part.straight_reach(wants_.reach));
       hn::StoreU(look.row, kD, entries_.row + i);
       hn::StoreU(look.col, kD, entries_.col + i);
       hn::StoreU(look.crossing, kD, entries_.crossing + i);

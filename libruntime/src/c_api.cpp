@@ -114,7 +114,8 @@ sqmap_status write_one(const std::optional<Contact>& found_contact, std::int32_t
 /// A part without arrays that its own counts promise keeps its map empty; the validator then says so.
 Part part_of(const sqmap_part_desc& desc) {
   Part part;
-  part.shape = {vector(desc.semi_axes_m), desc.e1, desc.e2, desc.taper};
+  part.shape = {
+      vector(desc.semi_axes_m), desc.e1, desc.e2, desc.taper, {desc.bend_per_m[0], desc.bend_per_m[1]}};
   const double* q = desc.orientation_wxyz;
   part.object_from_part = {{q[0], q[1], q[2], q[3]}, vector(desc.translation_m)};
   part.sphere = sphere(desc.sphere_m);

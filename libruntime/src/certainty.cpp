@@ -14,6 +14,11 @@ namespace {
 // 0.1) puts no point outside. The baker's bounds reach farther still: kBoundReach of libbake.
 constexpr float kShrink = 1 - 1.0F / 1024;
 
+Vec3f inward(const PartBend& bend, const Vec3f& p_part) noexcept {
+  const Vec3f inner = kShrink * bend.straightened(p_part);
+  return bend.is_none() ? inner : bend.point(bend.turn_at(inner), inner);
+}
+
 }  // namespace
 
 Certainty certainty_of(const Resident& resident, const Vec3f& p_m) noexcept {
@@ -26,7 +31,7 @@ Certainty certainty_of(const Resident& resident, const Vec3f& p_m) noexcept {
     const PartRecord& part = resident.part(k);
     if (!in_ball(p, part.sphere_centre, part.sphere_square)) continue;
     const Vec3f p_part = part.to_part(p);
-    if (!in_superquadric(part, kShrink * p_part)) continue;
+    if (!in_superquadric(part, inward(part.bend, p_part))) continue;
     const Certainty told = told_by(resident, part, p_part);
     if (in_superquadric(part, p_part)) {
       if (told != Certainty::kUnsure) return told;

@@ -14,6 +14,7 @@
 #include "sqmap/asset/shape_table.hpp"
 
 #include "certainty.hpp"
+#include "part_bend.hpp"
 #include "powers.hpp"
 #include "resident.hpp"
 #include "triangle.hpp"
@@ -88,7 +89,8 @@ inline float narrowing_at(const PartRecord& part, float z) noexcept {
 }
 
 /// Layer 1: F(p) <= 1 (FORMAT.md S1), from powers of the unit coordinates.
-inline bool in_superquadric(const PartRecord& part, const Vec3f& p) noexcept {
+inline bool in_superquadric(const PartRecord& part, const Vec3f& p_part) noexcept {
+  const Vec3f p = part.bend.straightened(p_part);
   float x = std::abs(p.x) * part.inverse_extents.x, y = std::abs(p.y) * part.inverse_extents.y;
   const float z = std::abs(p.z) * part.inverse_extents.z;
   if (!(x <= 1.0F && y <= 1.0F && z <= 1.0F)) return false;
@@ -101,9 +103,10 @@ inline bool in_superquadric(const PartRecord& part, const Vec3f& p) noexcept {
   return power_of(across, part.power_ratio) + power_of(z, part.power_1) <= 1.0F;
 }
 
-/// Outward unit normal, at p in the part, of the superquadric with the same axis, taper and a3 to which p
-/// belongs; zero at the centre.
-inline Vec3f shape_normal(const PartRecord& part, const Vec3f& p) noexcept {
+/// Outward unit normal, at p_part in the part, of the superquadric with the same axis, taper, bend and a3 to
+/// which it belongs; zero at the centre.
+inline Vec3f shape_normal(const PartRecord& part, const Vec3f& p_part) noexcept {
+  const Vec3f p = part.bend.straightened(p_part);
   const float narrowing = narrowing_at(part, p.z);
   const float b_x = part.inverse_extents.x * narrowing, b_y = part.inverse_extents.y * narrowing,
               b_z = part.inverse_extents.z;
@@ -121,8 +124,9 @@ inline Vec3f shape_normal(const PartRecord& part, const Vec3f& p) noexcept {
   if (!(scale > 0)) return {};
   const float rim = power_of(u / scale, part.power_1 - 1);
   const float lean = (part.taper * (narrowing / (1.0F + std::abs(part.taper)))) * (rim * u) * b_z;
-  return normalized(Vec3f{std::copysign(rim * normal_x * b_x, p.x), std::copysign(rim * normal_y * b_y, p.y),
-                          std::copysign(power_of(z / scale, part.power_1 - 1) * b_z, p.z) - lean});
+  const Vec3f gradient{std::copysign(rim * normal_x * b_x, p.x), std::copysign(rim * normal_y * b_y, p.y),
+                       std::copysign(power_of(z / scale, part.power_1 - 1) * b_z, p.z) - lean};
+  return normalized(part.bend.is_none() ? gradient : part.bend.gradient(part.bend.turn_at(p), gradient));
 }
 
 class Chart {
@@ -135,6 +139,10 @@ class Chart {
   ChartAnswer look(const Vec3f& p, bool third, std::uint32_t level, float edge) const noexcept;
   /// The represented surface at a place of level 0. False: its cell bounds no patch.
   bool patch_point(float row, float col, Vec3f& point) const noexcept;
+  /// Where a place of the straight frame lies in the part.
+  Vec3f to_part(const Vec3f& straight) const noexcept {
+    return part_.bend.is_none() ? straight : part_.bend.point(part_.bend.turn_at(straight), straight);
+  }
   /// delta of QueryOptions::edge_length_m at a place of the map.
   float offset(float row, float col, std::uint32_t level, float edge) const noexcept;
 
@@ -177,7 +185,12 @@ class Chart {
   }
   Vec3f place(float row, float col, float depth) const noexcept {
     const SurfaceSample<float> r = table_.sample(row, col);
-    return r.point_m - depth * r.normal;
+    return to_part(r.point_m - depth * r.normal);
+  }
+  /// The superquadric's normal at a place of its map; of a bent one of no certain length.
+  Vec3f shape_normal_at(float row, float col) const noexcept {
+    const SurfaceSample<float> r = table_.sample(row, col);
+    return part_.bend.is_none() ? r.normal : part_.bend.gradient(part_.bend.turn_at(r.point_m), r.normal);
   }
   ChartAnswer second_layer(const Vec3f& p, const Foot<float>& foot, std::uint32_t stride) const noexcept;
   struct Step {
@@ -219,10 +232,10 @@ inline Chart::Cell Chart::cell_at(float row, float col, std::uint32_t stride) co
   cell.eligible = true;
   for (int k = 0; k < 4; ++k) {
     const std::uint32_t texel = resident_.texel(part_, cell.texel[k]);
-    cell.code[k] = texel & part_.miss_code;
-    cell.starts[k] = texel > part_.miss_code;
+    cell.code[k] = texel & part_.miss_code();
+    cell.starts[k] = texel > part_.miss_code();
     cell.depth[k] = part_.depth_of(cell.code[k]);
-    cell.eligible = cell.eligible && texel < part_.miss_code;
+    cell.eligible = cell.eligible && texel < part_.miss_code();
   }
   return cell;
 }
@@ -238,13 +251,18 @@ inline Chart::Patch Chart::patch_at(const Cell& cell, float row, float col,
   const float depth_row = (high - low) * inverse;
   const float depth_col = (rise_low + s * (rise_high - rise_low)) * inverse;
   const SurfaceSample<float> r = table_.sample(row, col);
-  return {r.point_m - depth * r.normal, r.point_row_m - depth_row * r.normal - depth * r.normal_row,
-          r.point_col_m - depth_col * r.normal - depth * r.normal_col};
+  const Patch straight{r.point_m - depth * r.normal,
+                       r.point_row_m - depth_row * r.normal - depth * r.normal_row,
+                       r.point_col_m - depth_col * r.normal - depth * r.normal_col};
+  const PartBend& bend = part_.bend;
+  if (bend.is_none()) return straight;
+  const PartBend::Turn turn = bend.turn_at(straight.point);
+  return {bend.point(turn, straight.point), bend.step(turn, straight.row), bend.step(turn, straight.col)};
 }
 
 inline ChartAnswer Chart::look(const Vec3f& p, bool third, std::uint32_t level, float edge) const noexcept {
   const std::uint32_t stride = part_.stride_at(level);
-  const Foot<float> foot = table_.foot(p);
+  const Foot<float> foot = table_.foot(part_.bend.straightened(p));
   ChartAnswer answer = second_layer(p, foot, stride);
   // What the bounds prove leaves no doubt.
   if (const Certainty told = told_by(resident_, part_, p); told != Certainty::kUnsure) {
@@ -374,7 +392,7 @@ inline ChartAnswer Chart::second_layer(const Vec3f& p, const Foot<float>& foot,
     }
     odd = !odd;
   };
-  if (cell.code[nearest] != part_.miss_code) {
+  if (cell.code[nearest] != part_.miss_code()) {
     pass(depth[nearest] + shift, true);
     const std::uint32_t texel = cell.texel[nearest];
     for (std::uint32_t k = resident_.find(part_.sheets, texel);
@@ -392,15 +410,18 @@ inline ChartAnswer Chart::second_layer(const Vec3f& p, const Foot<float>& foot,
     if (!answer.has_point) return answer;
     answer.row = static_cast<float>(cell.row + (nearest < 2 ? 0 : stride));
     answer.col = static_cast<float>(cell.col + (nearest % 2 == 0 ? 0 : stride));
-    const SurfaceSample<float> r = table_.sample(answer.row, answer.col);
-    answer.surface = r.point_m - crossing * r.normal;
+    answer.surface = place(answer.row, answer.col, crossing);
     const Vec3f d = p - answer.surface;
     answer.distance = std::sqrt(dot(d, d));
-    answer.normal = (answer.leaving ? -1.0F : 1.0F) * r.normal;
+    answer.normal = (answer.leaving ? -1.0F : 1.0F) * shape_normal_at(answer.row, answer.col);
     return answer;
   }
   answer.distance = gap;
   answer.surface = place(foot.row, foot.col, crossing);
+  if (!part_.bend.is_none() && gap < std::numeric_limits<float>::infinity()) {
+    const Vec3f d = p - answer.surface;  // the gap is that in the straight frame
+    answer.distance = std::sqrt(dot(d, d));
+  }
   answer.normal =
       (answer.leaving ? -1.0F : 1.0F) * direction_of(patch_across(cell, foot.row, foot.col, stride));
   return answer;
@@ -445,9 +466,10 @@ inline Chart::Start Chart::start_beside(const Vec3f& p, float row, float col,
 }
 
 inline Chart::Start Chart::start_named(const Vec3f& p, std::uint32_t stride) const noexcept {
+  const Vec3f straight = part_.bend.straightened(p);
   Start best;
   for (int k = 0; k < StartTable::kAround; ++k) {
-    const std::uint16_t name = resident_.start(part_, p, k);
+    const std::uint16_t name = resident_.start(part_, straight, k);
     if (name == StartTable::kNone) continue;
     const Start start = start_at(p, part_.starts.place(name >> 8U), part_.starts.place(name & 255U), stride);
     if (start.square < best.square) best = start;

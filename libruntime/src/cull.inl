@@ -6,18 +6,19 @@ HWY_INLINE M in_ball(const V3& p, const Vec3f& centre, float square) {
   const V3 d = p - all(centre);
   return hn::Le(dot3(d, d), all(square));
 }
-/// |p| over the half extents of the part's box, p in the part's frame.
+/// |p| over the half extents of the part's box, p in its straight frame.
 HWY_INLINE V3 in_box(const PartRecord& part, const V3& p) {
   return {hn::Abs(p.x) * all(part.inverse_extents.x), hn::Abs(p.y) * all(part.inverse_extents.y),
           hn::Abs(p.z) * all(part.inverse_extents.z)};
 }
 
-/// Which of the balls reach into the part's sphere, and to the inner side of all its planes.
+/// Which of the balls reach into the part's sphere and, of a straight part, to the inner side of all its
+/// planes.
 HWY_INLINE M reaching(const PartRecord& part, const V3& centre, V radius, M wanted) {
   const V3 d = centre - all(part.sphere_centre);
   const V reach = all(part.sphere_radius) + radius;
   M near = hn::And(wanted, hn::Le(dot3(d, d), reach * reach));
-  if (none(near)) return near;
+  if (none(near) || !part.bend.is_none()) return near;
   const V3 w = in_box(part, rotated_back(part.object_from_part, centre - all(part.translation)));
   const auto within = [&](V sum, float bound, float factor)
                           HWY_ATTR { near = hn::And(near, hn::Le(sum, all(bound) + all(factor) * radius)); };
@@ -57,7 +58,7 @@ HWY_NOINLINE void cull(const PartRecord& part, const Chunk& chunk, Entries& out)
       for (std::uint32_t i = begin; i < end; i += lane_count()) {
         const V3 p = load3(chunk.x, chunk.y, chunk.z, i);
         const V3 q = rotated_back(part.object_from_part, p - all(part.translation));
-        const V3 w = in_box(part, q);
+        const V3 w = in_box(part, straightened(part.bend, q));
         M in = hn::And(hn::Le(w.x, all(1.0F)), hn::FirstN(kD, end - i));
         in = hn::And(in, hn::And(hn::Le(w.y, all(1.0F)), hn::Le(w.z, all(1.0F))));
         in = hn::And(in, hn::Le(w.x + w.y, all(slabs.across)));
@@ -78,9 +79,10 @@ HWY_NOINLINE void first_layer(const PartRecord& part, std::uint32_t begin, Entri
   for (std::uint32_t i = begin; i < end; i += lane_count()) {
     const V3 p = load3(entries.x, entries.y, entries.z, i);
     const VI point = hn::LoadU(kDI, entries.point + i);
-    V3 w = in_box(part, p);
+    const V3 straight = straightened(part.bend, p);
+    V3 w = in_box(part, straight);
     if (part.taper != 0) {
-      const V narrowing = narrowing_of(part, p.z);
+      const V narrowing = narrowing_of(part, straight.z);
       w.x = w.x * narrowing;
       w.y = w.y * narrowing;
     }

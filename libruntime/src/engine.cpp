@@ -50,6 +50,8 @@ namespace hn = hwy::HWY_NAMESPACE;
 //
 #include "lanes.inl"
 //
+#include "bends.inl"
+//
 #include "look.inl"
 //
 #include "walk.inl"

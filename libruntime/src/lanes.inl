@@ -105,31 +105,6 @@ HWY_INLINE V power_of(V x, float k) { return exp2_of(all(k) * log2_of(x)); }
 HWY_INLINE V narrowing_of(const PartRecord& part, V z) {
   return all(1.0F + std::abs(part.taper)) / (all(1.0F) + all(part.taper) * (z * all(part.inverse_extents.z)));
 }
-/// shape_normal() of chart.hpp.
-SQMAP_KERNEL V3 shape_normal_of(const PartRecord& part, const V3& p) {
-  const V zero = hn::Zero(kD), one = all(1.0F);
-  const V narrowing = narrowing_of(part, p.z);
-  const V bx = all(part.inverse_extents.x) * narrowing, by = all(part.inverse_extents.y) * narrowing,
-          bz = all(part.inverse_extents.z);
-  const V x = hn::Abs(p.x) * bx, y = hn::Abs(p.y) * by, z = hn::Abs(p.z) * bz;
-  const V more = most(x, y);
-  const M off_axis = hn::Gt(more, zero);
-  const V divisor = pick(off_axis, more, one);
-  const V u_x = x / divisor, u_y = y / divisor;
-  const V size = power_of(power_of(u_x, part.power_2) + power_of(u_y, part.power_2), 1 / part.power_2);
-  const V u = hn::IfThenElseZero(off_axis, more * size);
-  const V normal_x = hn::IfThenElseZero(off_axis, power_of(u_x / size, part.power_2 - 1));
-  const V normal_y = hn::IfThenElseZero(off_axis, power_of(u_y / size, part.power_2 - 1));
-  const V scale = most(u, z);
-  const M known = hn::Gt(scale, zero);
-  const V whole = pick(known, scale, one);
-  const V rim = power_of(u / whole, part.power_1 - 1);
-  const V lean = (all(part.taper) * (narrowing / all(1.0F + std::abs(part.taper)))) * (rim * u) * bz;
-  const V3 n{hn::CopySign(rim * normal_x * bx, p.x), hn::CopySign(rim * normal_y * by, p.y),
-             hn::CopySign(power_of(z / whole, part.power_1 - 1) * bz, p.z) - lean};
-  return pick(known, normalized3(n), V3{zero, zero, zero});
-}
-
 /// Four bytes from base + offset, wherever they begin.
 HWY_INLINE VU gather_bytes(const std::uint8_t* base, VI offset) {
 #if HWY_TARGET == HWY_AVX3 || HWY_TARGET == HWY_AVX2

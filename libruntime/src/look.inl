@@ -42,17 +42,27 @@ class Looker {
   /// Where layer 2 says the surface is, and its normal there.
   HWY_INLINE V3 surface_at(V row, V col, V crossing) const noexcept {
     const Sample r = sample_at(tables_, row, col);
-    return r.point - crossing * r.normal;
+    const V3 straight = r.point - crossing * r.normal;
+    if (part_.bend.is_none()) [[likely]]
+      return straight;
+    return bent_point(part_.bend, turn_at(part_.bend, straight), straight);
   }
   HWY_INLINE V3 normal_at(M lanes, V row, V col, M leaving, M on_patch) const noexcept {
     VCell cell = cell_at(row, col);
     read(cell);
     V3 normal = direction3(patch_across(cell, row, col));
-    if (!none(hn::AndNot(on_patch, lanes)))
-      normal = pick(on_patch, normal, sample_at(tables_, row, col).normal);
+    if (!none(hn::AndNot(on_patch, lanes))) normal = pick(on_patch, normal, shape_normal_at(row, col));
     return pick(leaving, all(-1.0F), all(1.0F)) * normal;
   }
-  /// Resident::start.
+  /// Chart::shape_normal_at.
+  HWY_INLINE V3 shape_normal_at(V row, V col) const noexcept {
+    const Sample r = sample_at(tables_, row, col);
+    if (part_.bend.is_none()) [[likely]]
+      return r.normal;
+    const VTurn turn = turn_at(part_.bend, r.point);
+    return turned(part_.bend, turn, r.normal, r.normal.z / turn.stretch);
+  }
+  /// Resident::start, of a place in the straight frame.
   HWY_INLINE VI start_of(const V3& p, int k) const noexcept {
     const StartTable& starts = part_.starts;
     const auto along = [&](V coordinate, int axis) HWY_ATTR {
@@ -120,7 +130,7 @@ class Looker {
     } else {
       for (int k = 0; k < 4; ++k) corners.texel[k] = hn::BitCast(kDI, hn::And(word_at(cell.texel[k]), mask));
     }
-    const VI miss = all_int(part_.miss_code);
+    const VI miss = all_int(part_.miss_code());
     const VI highest =
         hn::Max(hn::Max(corners.texel[0], corners.texel[1]), hn::Max(corners.texel[2], corners.texel[3]));
     corners.eligible = as_float(hn::Lt(highest, miss));
@@ -136,8 +146,11 @@ class Looker {
     const V depth_row = (high - low) * inverse;
     const V depth_col = (rise_low + s * (rise_high - rise_low)) * inverse;
     const Sample r = sample_at(tables_, row, col);
-    return {r.point - depth * r.normal, r.point_row - depth_row * r.normal - depth * r.normal_row,
-            r.point_col - depth_col * r.normal - depth * r.normal_col};
+    VPatch patch{r.point - depth * r.normal, r.point_row - depth_row * r.normal - depth * r.normal_row,
+                 r.point_col - depth_col * r.normal - depth * r.normal_col};
+    if (!part_.bend.is_none()) [[unlikely]]
+      bend(patch);
+    return patch;
   }
   SQMAP_KERNEL V3 patch_across(const VCell& cell, V row, V col) const noexcept {
     const VPatch patch = patch_at(cell, limited(row, all(kBesidePole), all(last_row_ - kBesidePole)), col);
@@ -161,6 +174,12 @@ class Looker {
   float turn() const noexcept { return turn_; }
 
  private:
+  HWY_NOINLINE void bend(VPatch& patch) const noexcept {
+    const VTurn turn = turn_at(part_.bend, patch.point);
+    patch.point = bent_point(part_.bend, turn, patch.point);
+    patch.row = turned(part_.bend, turn, patch.row, turn.stretch * patch.row.z);
+    patch.col = turned(part_.bend, turn, patch.col, turn.stretch * patch.col.z);
+  }
   /// StartTable::place.
   HWY_INLINE V start_place(VI k) const noexcept {
     const StartTable& starts = part_.starts;
@@ -206,7 +225,7 @@ SQMAP_KERNEL V Looker::offset(V row, V col, float edge) const noexcept {
 }
 
 SQMAP_KERNEL Look Looker::look(const V3& p, M wanted, float reach) const noexcept {
-  const VFoot foot = foot_of(tables_, p);
+  const VFoot foot = foot_of(tables_, straightened(part_.bend, p));
   const V zero = hn::Zero(kD), one = all(1.0F), half = all(0.5F);
   VCell cell = cell_at(foot.row, foot.col);
   const Corners corners = read(cell);
@@ -226,7 +245,7 @@ SQMAP_KERNEL Look Looker::look(const V3& p, M wanted, float reach) const noexcep
   const V doubt =
       pick(corners.eligible, all(0.25F) * (deep - shallow) + all(part_.depth_step), foot.cell * all(size_));
 
-  const VI miss = all_int(part_.miss_code);
+  const VI miss = all_int(part_.miss_code());
   const auto starts = [&](VI texel) HWY_ATTR { return hn::Gt(texel, miss); };
   const auto start = starts(near_texel);
   auto mixed = hn::Xor(starts(corners.texel[0]), start);
@@ -251,7 +270,13 @@ SQMAP_KERNEL Look Looker::look(const V3& p, M wanted, float reach) const noexcep
   look.row = look.foot_row = foot.row;
   look.col = look.foot_col = foot.col;
   look.crossing = crossing;
-  look.distance = pick(corners.eligible, gap, all(std::numeric_limits<float>::infinity()));
+  const V infinity = all(std::numeric_limits<float>::infinity());
+  look.distance = pick(corners.eligible, gap, infinity);
+  if (!part_.bend.is_none()) [[unlikely]] {  // the gap is that in the straight frame
+    const V3 d = p - surface_at(foot.row, foot.col, crossing);
+    const M has_gap = hn::And(corners.eligible, hn::Lt(gap, infinity));
+    look.distance = pick(has_gap, hn::Sqrt(dot3(d, d)), look.distance);
+  }
   // No patch, but a point of the surface: where the ray of the nearest texel crosses it.
   const M has_point = hn::And(hn::And(wanted, inside), hn::AndNot(corners.eligible, hit));
   if (!none(has_point)) {

@@ -176,8 +176,8 @@ float square_of_ball(const BoundingSphere& sphere, double units_per_m) {
 BoundingSphere sphere_around(const Asset& asset) noexcept {
   BoundingSphere sphere = asset.sphere;
   for (const Part& part : asset.parts) {
-    const double off_m = norm(part.object_from_part.translation_m - sphere.centre_m);
-    sphere.radius_m = std::max(sphere.radius_m, off_m + bounding_radius_m(part.shape));
+    const BoundingSphere held = bounding_sphere(part.shape, part.object_from_part);
+    sphere.radius_m = std::max(sphere.radius_m, norm(held.centre_m - sphere.centre_m) + held.radius_m);
   }
   return sphere;
 }
@@ -192,12 +192,12 @@ PartRecord put_part(Layout& out, const Part& part, const Curves& curves, const V
                     double units_per_m) {
   // Not the stored sphere: readers do not check that it holds the superquadric, and points would then be
   // dropped with one block and kept with another.
-  const BoundingSphere sphere =
-      seen_from(origin_m, {part.object_from_part.translation_m, bounding_radius_m(part.shape)});
+  const BoundingSphere sphere = seen_from(origin_m, bounding_sphere(part.shape, part.object_from_part));
   const DistanceMap& map = part.map;
   PartRecord record;
   record.semi_axes = cast<float>(units_per_m * part.shape.semi_axes_m);
   record.taper = static_cast<float>(part.shape.taper);
+  record.bend = PartBend::of(part.shape, units_per_m);
   const Vec3f half_extents = cast<float>(units_per_m * half_extents_m(part.shape));
   record.inverse_extents = {1 / half_extents.x, 1 / half_extents.y, 1 / half_extents.z};
   record.power_1 = static_cast<float>(2 / part.shape.e1);
@@ -215,7 +215,6 @@ PartRecord put_part(Layout& out, const Part& part, const Curves& curves, const V
   record.rows = map.rows;
   record.cols = map.cols;
   record.vertex_count = part.vertex_count;
-  record.miss_code = map.miss_code();
   record.level_count = static_cast<std::uint8_t>(map.level_count);
   record.code_bits = static_cast<std::uint8_t>(map.bits);
   const bool has_seam = std::any_of(map.start_inside.begin(), map.start_inside.end(),

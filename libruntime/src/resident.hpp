@@ -22,13 +22,17 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
+#include <limits>
 #include <memory>
 
 #include "sqmap/asset/asset.hpp"
 #include "sqmap/asset/shape_table.hpp"
+
+#include "part_bend.hpp"
 
 namespace sqmap::runtime {
 
@@ -69,7 +73,7 @@ struct StartTable {
   static constexpr std::uint16_t kNone = 0xFFFF;  ///< the part has no patch
 
   std::uint32_t at{};         ///< byte offset
-  std::uint32_t boxes[3]{};   ///< along x, y and z; x counts fastest
+  std::uint16_t boxes[3]{};   ///< along x, y and z; x counts fastest
   std::uint8_t step_shift{};  ///< log2 of the coarser grid's spacing [cells]
 
   static StartTable of(std::uint32_t rows, std::uint32_t cols, const Vec3f& half_extents) noexcept;
@@ -84,9 +88,10 @@ struct StartTable {
 /// One part. Lengths in units of Resident::unit_m; byte offsets count from the start of the allocation.
 struct PartRecord {
   Vec3f semi_axes;
-  Vec3f inverse_extents;  ///< 1 / the half extents of its box; 1 / semi_axes of a rigid one
+  Vec3f inverse_extents;  ///< 1 / the half extents of its box, straight frame; 1 / semi_axes of a rigid one
   float power_1{}, power_2{}, power_ratio{};  ///< 2/e1, 2/e2, e2/e1
   float taper{};                              ///< K
+  PartBend bend;
   Slabs slabs;
   Rotation<float> object_from_part;
   Vec3f translation;
@@ -95,7 +100,6 @@ struct PartRecord {
   float depth_min{}, depth_step{};
   CurveUnits eta_units, omega_units;
   std::uint32_t rows{}, cols{}, vertex_count{};
-  std::uint16_t miss_code{};
   std::uint8_t level_count{}, code_bits{}, texel_bits{};
   std::uint8_t bound_cells{};  ///< a side of a face; 0: no bounds
   std::uint32_t curves_at{}, texels_at{};
@@ -104,6 +108,16 @@ struct PartRecord {
 
   Vec3f to_part(const Vec3f& p) const noexcept { return object_from_part.apply_inverse(p - translation); }
   Vec3f to_object(const Vec3f& p_part) const noexcept { return object_from_part.apply(p_part) + translation; }
+  /// How far two places of the part may be from each other in the straight frame that are `reach` apart. The
+  /// line between them comes nearer to the middle of the arc than its ends by at most what this takes off.
+  float straight_reach(float reach) const noexcept {
+    if (bend.is_none()) return reach;
+    const float across = std::abs(bend.x) / inverse_extents.x + std::abs(bend.y) / inverse_extents.y;
+    const float stretch = 1.0F - bend.curvature * across, half = 0.5F * bend.curvature * reach;
+    const float square = stretch * stretch - half * half;
+    return square > 0 ? reach / std::sqrt(square) : std::numeric_limits<float>::infinity();
+  }
+  std::uint32_t miss_code() const noexcept { return (1U << code_bits) - 1U; }
   float depth_of(std::uint32_t code) const noexcept {
     return depth_min + static_cast<float>(code) * depth_step;
   }
@@ -162,7 +176,7 @@ class Resident {
     return load<BoundCell>(part.curves_at + kCurveBytes +
                            cell * static_cast<std::uint32_t>(sizeof(BoundCell)));
   }
-  /// StartTable: what the k-th of the boxes around p, part frame, names, or kNone.
+  /// StartTable: what the k-th of the boxes around p, straight frame, names, or kNone.
   std::uint16_t start(const PartRecord& part, const Vec3f& p, int k) const noexcept {
     const StartTable& starts = part.starts;
     std::uint32_t box = 0;

@@ -108,8 +108,11 @@ Outcome Scene::Impl::add_asset(const Asset& asset) {
   }
   std::vector<Shape>& all = shapes.emplace_back();
   for (const Part& part : asset.parts)
-    all.push_back({{cast<float>(part.shape.semi_axes_m), static_cast<float>(part.shape.e1),
-                    static_cast<float>(part.shape.e2), static_cast<float>(part.shape.taper)},
+    all.push_back({{cast<float>(part.shape.semi_axes_m),
+                    static_cast<float>(part.shape.e1),
+                    static_cast<float>(part.shape.e2),
+                    static_cast<float>(part.shape.taper),
+                    {static_cast<float>(part.shape.bend.x), static_cast<float>(part.shape.bend.y)}},
                    rotation<float>(part.object_from_part.orientation),
                    cast<float>(part.object_from_part.translation_m)});
   return Done{};

@@ -54,7 +54,7 @@ StartTable StartTable::of(std::uint32_t rows, std::uint32_t cols, const Vec3f& h
     const double extent = half_extents[order[k]];
     const double count =
         std::clamp(std::floor(extent / std::pow(volume / left, 1.0 / (3 - k)) + 1e-9), 1.0, left);
-    table.boxes[order[k]] = static_cast<std::uint32_t>(count);
+    table.boxes[order[k]] = static_cast<std::uint16_t>(count);
     left = std::floor(left / count);
     volume /= extent;
   }
@@ -103,7 +103,7 @@ void Resident::fill_starts(const PartRecord& part) {
   for (std::uint32_t z = 0; z < starts.boxes[2]; ++z) {
     for (std::uint32_t y = 0; y < starts.boxes[1]; ++y) {
       for (std::uint32_t x = 0; x < starts.boxes[0]; ++x, out += 2) {
-        const Vec3f p{middle(x, 0), middle(y, 1), middle(z, 2)};
+        const Vec3f p = chart.to_part({middle(x, 0), middle(y, 1), middle(z, 2)});
         for (std::size_t g = 0; g < groups.size(); ++g) distance[g] = norm(groups[g].centre - p);
         const auto closest = std::min_element(distance.begin(), distance.end()) - distance.begin();
         Candidate best{{}, StartTable::kNone};

@@ -34,11 +34,11 @@ Crossing crossing_at(const Vec3d& p_m, double spacing_m) {
 
 void add_part(const Part& part, double spacing_m, std::vector<Crossing>& crossings) {
   const DistanceMap& map = part.map;
-  const MapGrid grid(part.shape, map.rows, map.cols);
+  const MapGrid grid(straight(part.shape), map.rows, map.cols);
   const Rotation<double> turn = rotation(part.object_from_part.orientation);
   const auto add = [&](std::uint32_t texel, std::uint16_t code) {
     const std::uint32_t row = texel / map.cols, col = texel % map.cols;
-    const Vec3d p = grid.point(row, col) - map.depth_m(code) * grid.normal(row, col);
+    const Vec3d p = bent(part.shape.bend, grid.point(row, col) - map.depth_m(code) * grid.normal(row, col));
     crossings.push_back(crossing_at(turn.apply(p) + part.object_from_part.translation_m, spacing_m));
   };
   for (std::uint32_t texel = 0; texel < map.code.size(); ++texel)

@@ -22,7 +22,8 @@ Result<Sweeper> Sweeper::build(const Asset& asset) {
   sweeper.bodies_.reserve(asset.parts.size());
   for (const Part& part : asset.parts) {
     const Vec3d& a_m = part.shape.semi_axes_m;
-    const double least_m = (1 - std::abs(part.shape.taper)) * std::min({a_m.x, a_m.y, a_m.z});
+    const double narrowest = (1 - std::abs(part.shape.taper)) * (1 - bend_reach(part.shape));
+    const double least_m = narrowest * std::min({a_m.x, a_m.y, a_m.z});
     const double reach_m = norm(part.object_from_part.translation_m) + part.sphere.radius_m;
     // Four roundings of the coordinates, seen across the thinnest direction; 16 of beta itself.
     const double skin = std::numeric_limits<float>::epsilon() * std::max(4 * reach_m / least_m, 16.0);
@@ -129,11 +130,36 @@ class SweepRun {
     return time_to_plane(h_m, dot(from_centre_m, state.velocity_m) / distance_m, state.acceleration_m);
   }
 
+  /// How far a point outside of a bent superquadric surely is from it. `straight_m`: where in the straight
+  /// frame, with that beta; h_m: from the plane there that has all of it on its other side.
+  ///
+  /// A way of length d in the object is at most d / (L - k d) long in the straight frame, L = min(lambda, 1):
+  /// lambda changes by k a metre. So d = h L / (1 + k h) does not reach it; nor, with h <= 2/k, round the far
+  /// side of the arc. Nor does a way that is too short for lambda to become 1 - bend_reach().
+  static double clearance_m(const Superquadric& shape, const Vec3d& straight_m, double above_m) noexcept {
+    const double k = shape.bend.curvature(), least_stretch = 1 - bend_reach(shape);
+    // Beyond kMostBendTangent, 2.21 rad, places are not told apart; no superquadric turns beyond 2.
+    if (k * std::abs(straight_m.z) > 2.2) return least_stretch * std::sin(0.2) / k;
+    const double stretch = shape.bend.stretch(straight_m), h_m = std::min(above_m, 2 / k);
+    return std::max(h_m * std::min(stretch, 1.0) / (1 + k * h_m), (least_stretch - stretch) / k);
+  }
+  Relation relate_bent(const Sweeper::Body& body, const SweepPath::State& state,
+                       Relation relation) const noexcept {
+    const Superquadric unbent = straight(body.shape);
+    const Vec3d straight_m = straightened(body.shape.bend, relation.p_part_m);
+    const double above_m = (1 - 1 / relation.beta) * dot(normal_at(unbent, straight_m), straight_m);
+    const double free_m = relation.beta > 1 + body.skin ? clearance_m(body.shape, straight_m, above_m) : 0;
+    relation.side = free_m > tolerance_m_ / 16 ? Side::kOutside : Side::kSkin;
+    relation.free_time = time_in_ball(free_m, state);
+    return relation;
+  }
+
   Relation relate(const Sweeper::Body& body, const SweepPath::State& state) const noexcept {
     Relation relation{Side::kWithin, 0, 0, {}};
     relation.p_part_m = body.object_from_part.apply_inverse(state.p_m - body.translation_m);
     relation.beta = inside_outside_radial(body.shape, relation.p_part_m);
     if (relation.beta < 1 - body.skin) return relation;
+    if (!body.shape.bend.is_none()) return relate_bent(body, state, relation);
     const Vec3d normal = normal_at(body.shape, relation.p_part_m);
     // beta is homogeneous: grad beta . p = beta gives |grad beta|.
     const double h_m = (1 - 1 / relation.beta) * dot(normal, relation.p_part_m);
@@ -158,13 +184,15 @@ class SweepRun {
 
   /// Float may hold a point of the skin for outside: a place beside it that is surely inside; object frame.
   static Vec3d just_inside(const Sweeper::Body& body, const Relation& relation) noexcept {
-    const Vec3d& p_m = relation.p_part_m;
-    const Vec3d normal = normal_at(body.shape, p_m);
+    const Superquadric unbent = straight(body.shape);
+    const Vec3d p_m = straightened(body.shape.bend, relation.p_part_m), normal = normal_at(unbent, p_m);
     // Straight down is nearest; at a sharp edge it need not lead inside, towards the centre does.
-    Vec3d inner_m = p_m - (3 * body.skin * dot(normal, p_m)) * normal;
-    if (!(inside_outside_radial(body.shape, inner_m) < 1 - body.skin))
+    const double above = body.shape.bend.is_none() ? 0 : std::max(1 - 1 / relation.beta, 0.0);
+    const double down = 3 * body.skin + 2 * above;
+    Vec3d inner_m = p_m - (down * dot(normal, p_m)) * normal;
+    if (!(inside_outside_radial(unbent, inner_m) < 1 - body.skin))
       inner_m = ((1 - 2 * body.skin) / relation.beta) * p_m;
-    return body.object_from_part.apply(inner_m) + body.translation_m;
+    return body.object_from_part.apply(bent(body.shape.bend, inner_m)) + body.translation_m;
   }
 
   Look look_at(const SweepPath::State& state) const noexcept {

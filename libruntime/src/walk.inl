@@ -303,8 +303,9 @@ HWY_NOINLINE V Walker::find_named(const V3& p, M lanes, V& row, V& col) const no
   V best = all(std::numeric_limits<float>::infinity());
   VI chosen = all_int(StartTable::kNone);
   row = col = hn::Zero(kD);
+  const V3 straight = straightened(part_.bend, p);
   for (int k = 0; k < StartTable::kAround; ++k) {
-    const VI name = pick(lanes, looker_.start_of(p, k), all_int(StartTable::kNone));
+    const VI name = pick(lanes, looker_.start_of(straight, k), all_int(StartTable::kNone));
     // Most of the boxes around a point name the same.
     const M is_new =
         hn::And(as_float(hn::Ne(name, all_int(StartTable::kNone))), as_float(hn::Ne(name, chosen)));

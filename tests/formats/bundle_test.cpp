@@ -20,6 +20,7 @@
 namespace sqmap {
 namespace {
 
+using test::bent_asset;
 using test::bounded_asset;
 using test::Bytes;
 using test::identical;
@@ -50,26 +51,28 @@ TEST(Bundle, RoundTripKeepsAnAssetThatHasOnlyWhatItMust) {
   EXPECT_TRUE(identical(decoded.value(), asset));
 }
 
-TEST(Bundle, RoundTripKeepsBoundsAndTapers) {
-  for (const Asset& asset : {bounded_asset(), tapered_asset()}) {
+TEST(Bundle, RoundTripKeepsBoundsTapersAndBends) {
+  for (const Asset& asset : {bounded_asset(), tapered_asset(), bent_asset()}) {
     const auto decoded = io::decode(encoded(asset));
     ASSERT_TRUE(decoded) << decoded.error().finding;
     EXPECT_TRUE(identical(decoded.value(), asset));
     EXPECT_FALSE(identical(decoded.value(), rich_asset()));
   }
   EXPECT_FALSE(identical(tapered_asset(), bounded_asset()));
+  EXPECT_FALSE(identical(bent_asset(), tapered_asset()));
 }
 
-// What has no bounds and no tapers is a bundle of version 1.0, for readers that know no other.
+// What has no bounds, tapers and bends is a bundle of version 1.0, for readers that know no other.
 TEST(Bundle, HasTheEarliestVersionThatHoldsIt) {
-  for (const std::uint32_t minor : {0U, 1U, 2U}) {
-    const Bytes bytes = encoded(minor == 0 ? rich_asset() : minor == 1 ? bounded_asset() : tapered_asset());
+  const Asset assets[] = {rich_asset(), bounded_asset(), tapered_asset(), bent_asset()};
+  for (const std::uint32_t minor : {0U, 1U, 2U, 3U}) {
+    const Bytes bytes = encoded(assets[minor]);
     std::uint32_t found = 9;
     std::memcpy(&found, bytes.data() + 12, 4);
     EXPECT_EQ(found, minor);
     const auto sizes = io::stored_bytes(bytes);
     ASSERT_TRUE(sizes);
-    constexpr const char* kLast[] = {"/errors", "/maps/bounds", "/parts/taper"};
+    constexpr const char* kLast[] = {"/errors", "/maps/bounds", "/parts/taper", "/parts/bend_per_m"};
     EXPECT_EQ(sizes.value().back().name, kLast[minor]);
   }
 }
@@ -208,8 +211,10 @@ TEST(Bundle, LimitsAreKept) {
 
 // Each written when its version was made; they never change.
 TEST(Bundle, GoldenBundlesOfAllVersionsLoad) {
-  for (const auto& [name, asset] :
-       {std::pair{"v1_0.h5", rich_asset()}, {"v1_1.h5", bounded_asset()}, {"v1_2.h5", tapered_asset()}}) {
+  for (const auto& [name, asset] : {std::pair{"v1_0.h5", rich_asset()},
+                                    {"v1_1.h5", bounded_asset()},
+                                    {"v1_2.h5", tapered_asset()},
+                                    {"v1_3.h5", bent_asset()}}) {
     SCOPED_TRACE(name);
     std::ifstream file(std::string(SQMAP_GOLDEN_DIR "/") + name, std::ios::binary);
     const Bytes bytes{std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};

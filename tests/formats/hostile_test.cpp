@@ -179,19 +179,24 @@ TEST(Hostile, BoundsThatDoNotAddUpAreRefused) {
   }
 }
 
-TEST(Hostile, TapersThatDoNotAddUpAreRefused) {
-  const io::Document valid = io::to_document(test::tapered_asset());
+TEST(Hostile, TapersAndBendsThatDoNotAddUpAreRefused) {
+  const io::Document valid = io::to_document(test::bent_asset());
   ASSERT_TRUE(io::to_asset(valid));
-  for (const std::size_t bytes : {8U, 16U, 32U}) {
-    io::Document document = valid;
-    document.tables[io::kTaper].resize(bytes);
-    const auto asset = io::to_asset(document);
-    ASSERT_FALSE(asset);
-    EXPECT_NE(asset.error().finding.find("/parts/taper\""), std::string::npos) << asset.error().finding;
+  for (const auto& [id, path] :
+       {std::pair{io::kTaper, "/parts/taper\""}, {io::kBend, "/parts/bend_per_m\""}}) {
+    for (const std::size_t bytes : {16U, 32U, 64U}) {
+      io::Document document = valid;
+      document.tables[id].resize(bytes);
+      const auto asset = io::to_asset(document);
+      ASSERT_FALSE(asset);
+      EXPECT_NE(asset.error().finding.find(path), std::string::npos) << asset.error().finding;
+    }
   }
   io::Document rigid = valid;
   rigid.tables[io::kTaper].clear();
+  rigid.tables[io::kBend].clear();
   EXPECT_EQ(io::to_asset(rigid).value().parts[2].shape.taper, 0);
+  EXPECT_TRUE(io::to_asset(rigid).value().parts[2].shape.bend.is_none());
 }
 
 /// Length and digests as they would be had the file been made like this.

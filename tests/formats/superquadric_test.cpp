@@ -2,8 +2,10 @@
 #include "sqmap/asset/superquadric.hpp"
 
 #include <cmath>
+#include <complex>
 #include <numbers>
 #include <random>
+#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -258,6 +260,147 @@ TEST(BoundingRadius, IsTheFarthestSurfacePoint) {
       }
     }
   }
+}
+
+/// Bent shapes: thin, thick, hardly and as far as they may, tapered too; in all directions.
+std::vector<Superquadric> bent_shapes() {
+  std::vector<Superquadric> shapes;
+  for (const double e1 : {0.1, 0.4, 1.0, 2.0})
+    for (const double direction : {0.0, 0.7, kPi / 2, 2.5, -1.2})
+      for (const double turn : {0.002, 0.5, 2.0}) {
+        Superquadric sq{{0.3, 0.2, 2}, e1, 0.7, turn == 0.5 ? 0.8 * max_taper(e1) : 0};
+        const double k = turn / sq.semi_axes_m.z;
+        sq.bend = {k * std::cos(direction), k * std::sin(direction)};
+        shapes.push_back(sq);
+        sq.semi_axes_m = {1, 1.5, 0.5};
+        const double most = kMostBendReach / bend_reach(sq);
+        sq.bend = {most * sq.bend.x, most * sq.bend.y};
+        if (sq.bend.curvature() * sq.semi_axes_m.z <= kMostBendTurn) shapes.push_back(sq);
+      }
+  return shapes;
+}
+
+/// The bend as a turn in the complex plane, in long double: shares no line with bent().
+Vec3d turned_over(const Superquadric& sq, const Vec3d& q) {
+  using Real = long double;
+  const Real k = std::hypot(Real(sq.bend.x), Real(sq.bend.y));
+  const Real along_x = sq.bend.x / k, along_y = sq.bend.y / k, r = along_x * q.x + along_y * q.y;
+  const std::complex<Real> place = (1 - k * r) * std::exp(std::complex<Real>(0, k * q.z));
+  const Real lean = (1 - place.real()) / k - r;
+  return {static_cast<double>(q.x + lean * along_x), static_cast<double>(q.y + lean * along_y),
+          static_cast<double>(place.imag() / k)};
+}
+
+/// Surface points of eta by omega, straight and bent.
+template <class Use>
+void over_surface(const Superquadric& sq, int steps, const Use& use) {
+  for (int row = -steps; row <= steps; ++row) {
+    for (int col = 0; col < 4 * steps; ++col) {
+      const double half_turn = kPi / 2 / steps;
+      const auto eta = superellipse_point(std::cos(row * half_turn), std::sin(row * half_turn), sq.e1);
+      const auto omega = superellipse_point(std::cos(col * half_turn), std::sin(col * half_turn), sq.e2);
+      use(surface_point(straight(sq), eta, omega), surface_point(sq, eta, omega),
+          surface_normal(sq, eta, omega));
+    }
+  }
+}
+
+TEST(Bend, TurnsWhatIsStraightAroundTheMiddleOfItsArcAndBack) {
+  for (const Superquadric& sq : bent_shapes()) {
+    over_surface(sq, 8, [&](const Vec3d& q, const Vec3d& p, const Vec3d&) {
+      for (const double share : {1.0, 0.6, 0.0}) {
+        const Vec3d inner = share * q, expected = turned_over(sq, inner);
+        EXPECT_NEAR(norm(bent(sq.bend, inner) - expected), 0, 1e-12);
+        EXPECT_NEAR(norm(straightened(sq.bend, expected) - inner), 0, 1e-12);
+        EXPECT_NEAR(inside_outside_radial(sq, expected), share, 1e-9);
+      }
+      EXPECT_NEAR(norm(p - turned_over(sq, q)), 0, 1e-12);
+    });
+  }
+}
+
+// Every point has one place: none outside comes to lie inside by what is done beyond the reach of bends.
+TEST(Bend, NoPointBeyondTheEndsIsInside) {
+  std::mt19937_64 rng(12);
+  std::uniform_real_distribution<double> unit(-1, 1);
+  int inside = 0;
+  for (const Superquadric& sq : bent_shapes()) {
+    for (int i = 0; i < 2000; ++i) {
+      const Vec3d p{4 * unit(rng), 4 * unit(rng), 4 * unit(rng)};
+      const double beta = inside_outside_radial(sq, p);
+      ASSERT_TRUE(std::isfinite(beta));
+      EXPECT_NEAR(norm(normal_at(sq, p)), 1, 1e-9);
+      if (beta > 1) continue;
+      ++inside;
+      // What is inside comes back by the other way, too.
+      EXPECT_NEAR(norm(turned_over(sq, straightened(sq.bend, p)) - p), 0, 1e-11);
+    }
+    // The middle of the arc, and behind it.
+    const double k = sq.bend.curvature();
+    for (const double radii : {1.0, 1.5, 2.0, 3.0}) {
+      const Vec3d p{radii * sq.bend.x / (k * k), radii * sq.bend.y / (k * k), 0};
+      EXPECT_GT(inside_outside_radial(sq, p), 1);
+      EXPECT_TRUE(std::isfinite(norm(normal_at(sq, p))));
+    }
+  }
+  EXPECT_GT(inside, 1000);
+}
+
+TEST(Bend, NormalsAreThoseOfTheBentSurface) {
+  for (const Superquadric& sq : bent_shapes()) {
+    if (sq.e1 < 0.4 || sq.e1 > 1.9) continue;  // edges, and tips that have no normal
+    int count = 0;
+    over_surface(sq, 16, [&](const Vec3d&, const Vec3d& p, const Vec3d& n) {
+      EXPECT_NEAR(norm(normal_at(sq, p) - n), 0, 1e-6);
+      constexpr double kStep = 1e-5;
+      Vec3d slope;
+      double change = 0;
+      for (int axis = 0; axis < 3; ++axis) {
+        Vec3d above = p, below = p;
+        above[axis] += kStep;
+        below[axis] -= kStep;
+        slope[axis] = inside_outside_radial(sq, above) - inside_outside_radial(sq, below);
+        change += std::abs(inside_outside_radial(sq, above) + inside_outside_radial(sq, below) - 2);
+      }
+      if (change > 1e-3 * norm(slope)) return;
+      ++count;
+      EXPECT_GT(dot(normalized(slope), n), 1 - 1e-5);
+    });
+    EXPECT_GT(count, 300);
+  }
+}
+
+TEST(Bend, SphereHoldsTheBodyAndIsTight) {
+  for (const Superquadric& sq : bent_shapes()) {
+    const BoundingSphere sphere = bounding_sphere(sq);
+    double farthest = 0;
+    over_surface(sq, 64, [&](const Vec3d&, const Vec3d& p, const Vec3d&) {
+      farthest = std::max(farthest, norm(p - sphere.centre_m));
+    });
+    EXPECT_GE(sphere.radius_m, farthest);
+    EXPECT_LE(sphere.radius_m, 1.35 * farthest);  // discs stand for thin cross-sections
+    EXPECT_LE(bounding_sphere(sq, {{0.5, 0.5, -0.5, 0.5}, {1, 2, 3}}).radius_m, sphere.radius_m);
+  }
+  // A half ring: its ball is hardly larger than the ring.
+  Superquadric ring{{0.1, 0.1, 3.1}, 1, 1};
+  ring.bend = {0.6, 0};
+  EXPECT_LT(bounding_sphere(ring).radius_m, 1.9);
+}
+
+TEST(Bend, LeavesTheVolume) {
+  std::mt19937_64 rng(13);
+  std::uniform_real_distribution<double> unit(-1, 1);
+  Superquadric sq{{0.5, 0.3, 1.2}, 0.5, 0.8, 0.3};
+  sq.bend = {0.9, 0.5};
+  const BoundingSphere sphere = bounding_sphere(sq);
+  constexpr int kPoints = 400000;
+  int inside = 0;
+  for (int i = 0; i < kPoints; ++i) {
+    const Vec3d d{unit(rng), unit(rng), unit(rng)};
+    inside += inside_outside_radial(sq, sphere.centre_m + sphere.radius_m * d) <= 1;
+  }
+  const double found = 8 * std::pow(sphere.radius_m, 3) * inside / kPoints;
+  EXPECT_NEAR(found, volume_m3(sq), 0.01 * found);
 }
 
 }  // namespace

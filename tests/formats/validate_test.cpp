@@ -16,7 +16,7 @@
 namespace sqmap {
 namespace {
 
-using test::tapered_asset;
+using test::bent_asset;
 
 const double kNan = std::numeric_limits<double>::quiet_NaN();
 const double kInfinity = std::numeric_limits<double>::infinity();
@@ -83,6 +83,23 @@ const std::vector<Breakage>& breakages() {
          a.parts[0].shape = {{0.3, 0.4, 0.6}, 2, 1, 0.01};
        }},
       {29, "taper NaN", [](Asset& a) { a.parts[1].shape.taper = kNan; }},
+      {40, "bend by more than 2 rad",
+       [](Asset& a) {
+         a.parts[2].shape.bend = {0, 4.01};
+       }},
+      {40, "bend of next to nothing",
+       [](Asset& a) {
+         a.parts[2].shape.bend = {1e-9, 0};
+       }},
+      {40, "bend tighter than the part is thick",
+       [](Asset& a) {
+         a.parts[2].shape.bend = {0, 0.95};
+       }},
+      {40, "bend NaN", [](Asset& a) { a.parts[2].shape.bend.x = kNan; }},
+      {40, "bend beside bounds",
+       [](Asset& a) {
+         a.parts[0].shape.bend = {0.1, 0};
+       }},
       {30, "no level", [](Asset& a) { a.parts[1].map.level_count = 0; }},
       {30, "too many levels", [](Asset& a) { a.parts[1].map.level_count = 40; }},
       {31, "even rows", [](Asset& a) { a.parts[1].map.rows = 8; }},
@@ -139,13 +156,13 @@ std::set<int> rules_of(const std::vector<Finding>& findings) {
 }
 
 TEST(Validate, RichAssetBreaksNoRule) {
-  const auto findings = validate(tapered_asset(), CheckLevel::kFull);
+  const auto findings = validate(bent_asset(), CheckLevel::kFull);
   EXPECT_TRUE(findings.empty()) << findings.front().rule << ": " << findings.front().message;
 }
 
 TEST(Validate, FindsEachBrokenRuleUnderItsNumber) {
   for (const Breakage& breakage : breakages()) {
-    Asset asset = tapered_asset();
+    Asset asset = bent_asset();
     breakage.apply(asset);
     EXPECT_TRUE(rules_of(validate(asset, CheckLevel::kFull)).contains(breakage.rule))
         << breakage.what << " is not found as rule " << breakage.rule;
@@ -168,7 +185,7 @@ TEST(Validate, FormatPageListsExactlyTheseRules) {
 
 TEST(Validate, QuickFindsWhatAReaderMustTrust) {
   for (const Breakage& breakage : breakages()) {
-    Asset asset = tapered_asset();
+    Asset asset = bent_asset();
     breakage.apply(asset);
     EXPECT_EQ(rules_of(validate(asset, CheckLevel::kQuick)).contains(breakage.rule), breakage.rule < 50)
         << breakage.what;
@@ -176,7 +193,7 @@ TEST(Validate, QuickFindsWhatAReaderMustTrust) {
 }
 
 TEST(Validate, NamesThePartAndTheValue) {
-  Asset asset = tapered_asset();
+  Asset asset = bent_asset();
   asset.parts[1].shape.e1 = 7.25;
   const auto findings = validate(asset, CheckLevel::kQuick);
   ASSERT_EQ(findings.size(), 1u);
@@ -185,7 +202,7 @@ TEST(Validate, NamesThePartAndTheValue) {
 }
 
 TEST(Validate, OrdersFindingsByRuleAndPart) {
-  Asset asset = tapered_asset();
+  Asset asset = bent_asset();
   asset.parts[2].shape.e1 = asset.parts[0].shape.e1 = 3;
   asset.parts[1].shape.semi_axes_m.x = -1;
   asset.r_max_m = -1;
@@ -198,11 +215,11 @@ TEST(Validate, OrdersFindingsByRuleAndPart) {
 }
 
 TEST(Validate, IsTotalForAnythingBrokenTogether) {
-  Asset asset = tapered_asset();
+  Asset asset = bent_asset();
   std::set<int> rules;
   for (const Breakage& breakage : breakages()) {
     breakage.apply(asset);
-    if (asset.parts.size() != 3) asset.parts = tapered_asset().parts;
+    if (asset.parts.size() != 3) asset.parts = bent_asset().parts;
     for (const Finding& finding : validate(asset, CheckLevel::kFull)) rules.insert(finding.rule);
   }
   EXPECT_GT(rules.size(), 20u);
@@ -210,7 +227,7 @@ TEST(Validate, IsTotalForAnythingBrokenTogether) {
 }
 
 TEST(Validate, AcceptsTheLimitsThemselves) {
-  Asset asset = tapered_asset();
+  Asset asset = bent_asset();
   asset.parts[2].shape.e1 = kMinExponent;
   asset.parts[2].shape.e2 = kMaxExponent;
   asset.provenance.generator.assign(4096, 'x');

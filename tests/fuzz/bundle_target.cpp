@@ -41,7 +41,7 @@ std::vector<sqmap::fuzz::Bytes> sqmap::fuzz::seeds() {
   small.face_labels.clear();
   small.errors.clear();
   return {io::encode(test::rich_asset()).value(), io::encode(small).value(),
-          io::encode(test::tapered_asset()).value()};
+          io::encode(test::bent_asset()).value()};
 }
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // What stands behind a correct content hash: the arrays of a bundle with arbitrary content. The input is a
-// list of edits of the arrays of test::tapered_asset(): which array, where, how many bytes, the bytes.
+// list of edits of the arrays of test::bent_asset(): which array, where, how many bytes, the bytes.
 #include <algorithm>
 #include <cstring>
 #include <utility>
@@ -70,7 +70,7 @@ std::vector<Bytes> sqmap::fuzz::seeds() {
 }
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  static const Document kDocument = sqmap::io::to_document(sqmap::test::tapered_asset());
+  static const Document kDocument = sqmap::io::to_document(sqmap::test::bent_asset());
   Document document = kDocument;
   Edits edits(data, size);
   constexpr std::size_t kTexts = sqmap::io::kTextCount, kNumbers = sqmap::io::kNumberCount,

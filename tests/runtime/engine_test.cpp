@@ -66,8 +66,8 @@ std::string target_name(const testing::TestParamInfo<SimdTarget>& target) {
 INSTANTIATE_TEST_SUITE_P(Engine, EveryTarget, testing::ValuesIn(kTargets), target_name);
 
 TEST_P(EveryTarget, AnswersLikeTheSinglePointToTheLastBit) {
-  for (const double taper_share : {0.0, 0.9}) {
-    const Asset asset = test::mixed_asset(9, taper_share);
+  for (const auto& [taper_share, turn_rad] : {std::pair{0.0, 0.0}, {0.9, 0.0}, {0.0, 1.5}, {0.5, 0.4}}) {
+    const Asset asset = test::mixed_asset(9, taper_share, turn_rad);
     const Object object = built(asset);
     const std::vector<Vec3f> points = test::points_around(asset, 3000, 21);
     Batch batch(points.size());
@@ -85,7 +85,7 @@ TEST_P(EveryTarget, AnswersLikeTheSinglePointToTheLastBit) {
           nowhere += one.part == kNowhere;
         }
         EXPECT_EQ(differing, 0) << "layer " << int(layer) << ", level " << level << ", edge " << edge_m
-                                << ", taper " << taper_share;
+                                << ", taper " << taper_share << ", turn " << turn_rad;
         EXPECT_GT(inside, 500);
         EXPECT_GT(nowhere, 100);
         EXPECT_EQ(known > 1000, layer != Layer::kOne) << known;
@@ -294,8 +294,8 @@ TEST(Resident, HoldsEveryCodeStartSheetAndSample) {
       const PartRecord& part = resident.part(k);
       for (std::uint32_t texel = 0; texel < map.rows * map.cols; ++texel) {
         const std::uint32_t held = resident.texel(part, texel);
-        ASSERT_EQ(held & part.miss_code, map.code[texel]);
-        ASSERT_EQ(held > part.miss_code, map.starts_inside(texel));
+        ASSERT_EQ(held & part.miss_code(), map.code[texel]);
+        ASSERT_EQ(held > part.miss_code(), map.starts_inside(texel));
         starts += map.starts_inside(texel);
       }
       for (std::uint32_t i = 0; i < map.crossings.size(); ++i) {
@@ -322,8 +322,8 @@ TEST(Resident, HoldsEveryCodeStartSheetAndSample) {
 }
 
 TEST(Resident, TakesTheBytesItsFormulaSays) {
-  for (const double taper_share : {0.0, 0.5}) {
-    const Asset asset = test::mixed_asset(7, taper_share);
+  for (const auto& [taper_share, turn_rad] : {std::pair{0.0, 0.0}, {0.5, 0.0}, {0.5, 1.0}}) {
+    const Asset asset = test::mixed_asset(7, taper_share, turn_rad);
     const Resident resident(asset);
     std::size_t bytes = 4;
     for (std::uint32_t k = 0; k < resident.part_count(); ++k) {

@@ -89,8 +89,24 @@ const Swept& ball_in_taper() {
   return kSwept;
 }
 
+/// The same ball in a bent superquadric.
+const Swept& ball_in_bend() {
+  static const Swept kSwept = [] {
+    Superquadric shape{{1.35, 1.35, 1.5}, 1, 1};
+    shape.bend = {0.35, 0.2};
+    const auto holds = [](const Vec3d& p) { return norm(p - kCentre) < kRadius; };
+    return Swept::of(test::asset_of({test::traced_part(shape, {}, 65, 128, 1, 1.2,
+                                                       [&](const Vec3d& o, const Vec3d& d, bool& inside) {
+                                                         return test::bent_crossings_m(shape, holds, o, d,
+                                                                                       1.2, inside);
+                                                       })},
+                                    2 * kRadius));
+  }();
+  return kSwept;
+}
+
 class SweptBall : public testing::TestWithParam<const Swept& (*)()> {};
-INSTANTIATE_TEST_SUITE_P(Sweep, SweptBall, testing::Values(&ball, &ball_in_taper));
+INSTANTIATE_TEST_SUITE_P(Sweep, SweptBall, testing::Values(&ball, &ball_in_taper, &ball_in_bend));
 
 TEST_P(SweptBall, IsMetWhereTheLineDoes) {
   const Swept& swept = GetParam()();

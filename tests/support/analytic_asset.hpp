@@ -47,7 +47,28 @@ inline std::vector<double> union_crossings_m(const std::vector<Ball>& balls, con
   return crossings;
 }
 
-/// Crossings of a ray given in the object frame; sets `inside` for its start.
+/// Distances along a ray of a bent shape, which is straight in the straight frame, at which it enters or
+/// leaves what `holds`, of points of the part frame, tells: by halves of steps.
+template <class Holds>
+std::vector<double> bent_crossings_m(const Superquadric& shape, const Holds& holds, const Vec3d& origin_m,
+                                     const Vec3d& direction, double reach_m, bool& inside) {
+  const auto held = [&](double t) { return holds(bent(shape.bend, origin_m + t * direction)); };
+  constexpr int kSteps = 400, kHalvings = 40;
+  std::vector<double> crossings;
+  inside = held(0);
+  for (int k = 0; k < kSteps; ++k) {
+    double low = reach_m * k / kSteps, high = reach_m * (k + 1) / kSteps;
+    const bool before = held(low);
+    if (held(high) == before) continue;
+    for (int i = 0; i < kHalvings; ++i)
+      (held(0.5 * (low + high)) == before ? low : high) = 0.5 * (low + high);
+    crossings.push_back(0.5 * (low + high));
+  }
+  return crossings;
+}
+
+/// Crossings of a ray given in the object frame, or of a bent part in its straight frame; sets `inside` for
+/// its start.
 using Crossings =
     std::function<std::vector<double>(const Vec3d& origin_m, const Vec3d& direction, bool& inside)>;
 
@@ -58,7 +79,7 @@ inline Part traced_part(const Superquadric& shape, const Vec3d& centre_m, std::u
   Part part;
   part.shape = shape;
   part.object_from_part.translation_m = centre_m;
-  part.sphere = {centre_m, bounding_radius_m(shape)};
+  part.sphere = bounding_sphere(shape, part.object_from_part);
   part.vertex_count = 100;
   part.face_count = 200;
   part.volume_m3 = 1;
@@ -70,7 +91,7 @@ inline Part traced_part(const Superquadric& shape, const Vec3d& centre_m, std::u
   map.depth_min_m = 0;
   map.depth_step_m = reach_m / 65534;
   map.start_inside.assign((rows * cols + 7) / 8, 0);
-  const MapGrid grid(shape, rows, cols);
+  const MapGrid grid(straight(shape), rows, cols);
   for (std::uint32_t row = 0; row < rows; ++row) {
     for (std::uint32_t col = 0; col < cols; ++col) {
       const std::uint32_t texel = row * cols + col;

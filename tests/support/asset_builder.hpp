@@ -127,6 +127,16 @@ inline Asset tapered_asset() {
   return asset;
 }
 
+/// tapered_asset() with its last part bent: everything that version 1.3 can hold.
+///
+/// tests/formats/golden/v1_3.h5 is encode() of it.
+inline Asset bent_asset() {
+  Asset asset = tapered_asset();
+  asset.parts[2].shape.bend = {0.5, -0.25};
+  asset.parts[2].sphere.radius_m = 1.015625;
+  return asset;
+}
+
 inline bool same_bits(double a, double b) {
   return std::bit_cast<std::uint64_t>(a) == std::bit_cast<std::uint64_t>(b);
 }

@@ -19,8 +19,9 @@ inline const std::vector<Ball>& mixed_balls() {
   return kBalls;
 }
 
-/// `taper_share` of max_taper, or its negative, for every other part.
-inline Asset mixed_asset(std::uint32_t bits = 9, double taper_share = 0) {
+/// `taper_share` of max_taper, or its negative, for every other part. Bent ones turn by `turn_rad` to either
+/// side, as far as they are thin enough; their maps are of another surface than that of mixed_balls().
+inline Asset mixed_asset(std::uint32_t bits = 9, double taper_share = 0, double turn_rad = 0) {
   const std::vector<Ball>& balls = mixed_balls();
   struct Shape {
     Superquadric shape;
@@ -37,6 +38,12 @@ inline Asset mixed_asset(std::uint32_t bits = 9, double taper_share = 0) {
   std::vector<Part> parts;
   for (Shape& s : shapes) {
     s.shape.taper = (parts.size() % 2 == 0 ? taper_share : -taper_share) * max_taper(s.shape.e1);
+    if (turn_rad != 0) {
+      const double k = turn_rad / s.shape.semi_axes_m.z, direction = 0.9 * static_cast<double>(parts.size());
+      s.shape.bend = {k * std::cos(direction), k * std::sin(direction)};
+      const double most = std::min(1.0, kMostBendReach / bend_reach(s.shape));
+      s.shape.bend = {most * s.shape.bend.x, most * s.shape.bend.y};
+    }
     const Rotation<double> turn = rotation<double>(s.pose.orientation);
     Part part = traced_part(s.shape, {}, s.rows, s.cols, s.levels, 1.3,
                             [&](const Vec3d& origin_m, const Vec3d& direction, bool& inside) {
@@ -46,7 +53,7 @@ inline Asset mixed_asset(std::uint32_t bits = 9, double taper_share = 0) {
     const Quaternion& q = s.pose.orientation;
     const double length = std::sqrt(q.w * q.w + q.x * q.x + q.y * q.y + q.z * q.z);
     part.object_from_part = {{q.w / length, q.x / length, q.y / length, q.z / length}, s.pose.translation_m};
-    part.sphere.centre_m = s.pose.translation_m;
+    part.sphere = bounding_sphere(s.shape, part.object_from_part);
     part.vertex_count = parts.size() % 2 == 0 ? 1000 : 20;  // the automatic layer is 3 for some, 2 for others
     DistanceMap& map = part.map;
     const auto coarser = [&](std::uint16_t code) {
@@ -86,6 +93,7 @@ inline Asset scaled(Asset asset, double factor) {
   scale_ball(asset.sphere);
   for (Part& part : asset.parts) {
     part.shape.semi_axes_m = factor * part.shape.semi_axes_m;
+    part.shape.bend = {part.shape.bend.x / factor, part.shape.bend.y / factor};
     part.object_from_part.translation_m = factor * part.object_from_part.translation_m;
     scale_ball(part.sphere);
     part.map.depth_min_m *= factor;

@@ -98,6 +98,7 @@ typedef struct sqmap_part_desc {
   const uint8_t* vertex_256ths;  // [2 * vertex_sample_count]: along the rows, along the columns
   const uint16_t* vertex_code;   // [vertex_sample_count]
   double taper;                  // K; 0: a rigid superquadric
+  double bend_per_m[2];          // k cos alpha, k sin alpha [1/m]; 0: straight
 } sqmap_part_desc;
 
 typedef struct sqmap_asset_desc {

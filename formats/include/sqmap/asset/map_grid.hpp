@@ -38,7 +38,7 @@ class MapGrid {
   SuperellipsePoint<double> eta(std::uint32_t row) const noexcept;
   /// Superellipse point of a column, omega from -pi (column 0) up to, not including, +pi.
   SuperellipsePoint<double> omega(std::uint32_t col) const noexcept;
-  /// Surface point r of a node [m].
+  /// Surface point r of a node [m], part frame as the normal.
   Vec3d point(std::uint32_t row, std::uint32_t col) const noexcept {
     return surface_point(shape_, eta(row), omega(col));
   }

@@ -60,12 +60,13 @@ struct PointMotion {
 /// The object moves from one placement to another at constant velocity of its origin and constant angular
 /// velocity, by the shorter way round. A sweep advances by steps within which there can be no contact:
 ///
-///  - Outside a superquadric the step is proven. beta (FORMAT.md S1) is a norm, hence convex: the plane
+///  - Outside a superquadric the step is proven. beta (FORMAT.md S1) is convex: the plane
 ///    through the point's image x on the surface, normal to n = grad beta(p), has the whole superquadric, and
 ///    all material that its map represents, behind it, at distance h = (beta - 1) / |grad beta| from p. With
 ///    a bound A on the acceleration of the point in the object's frame it cannot get there before dt, with
 ///    h + (n . v) dt - A dt^2 / 2 = 0. For an object that does not turn this is Newton's method on a convex
-///    function, which never overshoots.
+///    function, which never overshoots. Of a bent superquadric the plane stands in its straight frame, and
+///    the step is what that leaves in every direction: steps towards one are shorter.
 ///  - Inside, the step is the answered distance less the error that the bundle declares. That error is
 ///    measured, not a bound: this step is as good as the map. Where the map knows no distance, steps are
 ///    kBlindStep of the least semi-axis there, and walls thinner than this may be passed.
@@ -96,7 +97,7 @@ class Sweeper {
 
  private:
   friend class SweepRun;
-  /// One superquadric as a convex body.
+  /// One superquadric, in its straight frame a convex body.
   struct Body {
     Superquadric shape;
     Rotation<double> object_from_part;
