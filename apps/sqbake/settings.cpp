@@ -110,6 +110,10 @@ Outcome apply_taper(AssetOptions& options, std::string_view text) {
   return choose<bool>(text, kSwitchNames, options.bake.fit.taper);
 }
 
+Outcome apply_bend(AssetOptions& options, std::string_view text) {
+  return choose<bool>(text, kSwitchNames, options.bake.fit.bend);
+}
+
 Outcome apply_timeout(AssetOptions& options, std::string_view text) {
   const Result<double> seconds = parse_duration(text);
   if (!seconds) return seconds.error();
@@ -153,11 +157,12 @@ std::string default_max_parts() { return max_parts_text(kDefaults.bake); }
 std::string default_max_bytes() { return max_bytes_text(kDefaults.bake); }
 std::string default_conservative() { return name_of<bool>(kDefaults.bake.conservative, kSwitchNames); }
 std::string default_taper() { return name_of<bool>(kDefaults.bake.fit.taper, kSwitchNames); }
+std::string default_bend() { return name_of<bool>(kDefaults.bake.fit.bend, kSwitchNames); }
 std::string default_timeout() { return fmt::format("{}s", kDefaults.timeout_s); }
 std::string default_memory() { return "machine"; }
 std::string default_fallback() { return name_of<Fallback>(kDefaults.fallback, kFallbackNames); }
 
-constexpr std::array<Setting, 12> kSettings{{
+constexpr std::array<Setting, 13> kSettings{{
     {"unit", "UNIT", "Unit of the coordinates: m, cm, mm, um, in, ft or a number of metres", default_unit,
      apply_unit},
     {"up", "x|y|z", "Axis of the input that points up; turned to z", default_up, apply_up},
@@ -180,6 +185,9 @@ constexpr std::array<Setting, 12> kSettings{{
     {"taper", "on|off",
      "Taper superquadrics where that saves memory at the target error; a bake takes\nabout 1.5 times as long",
      default_taper, apply_taper},
+    {"bend", "on|off",
+     "Bend superquadrics where that saves memory at the target error; not with\n--conservative", default_bend,
+     apply_bend},
     {"timeout", "TIME", "End the bake of a mesh after this time: 90s, 5m, 2h or none", default_timeout,
      apply_timeout},
     {"memory", "BYTES",

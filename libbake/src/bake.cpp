@@ -189,38 +189,38 @@ Asset with_quick_fits(const Asset& asset, const std::vector<Piece>& pieces) {
   return quick;
 }
 
-/// The shapes that each part of the asset may have: its own and, where there is one, the tapered one.
+/// The shapes that each part of the asset may have, its own first.
 std::vector<std::vector<PlacedShape>> shapes_of(const Asset& asset, const std::vector<Piece>& pieces) {
   std::vector<std::vector<PlacedShape>> shapes;
   for (std::size_t k = 0; k < pieces.size(); ++k) {
     std::vector<PlacedShape>& of_part = shapes.emplace_back();
     of_part.push_back({asset.parts[k].shape, asset.parts[k].object_from_part});
-    if (const auto& tapered = pieces[k].tapered)
-      of_part.push_back({tapered->part.shape, tapered->part.object_from_part});
+    for (const FittedPart& other : pieces[k].others)
+      of_part.push_back({other.part.shape, other.part.object_from_part});
   }
   return shapes;
 }
 
-/// The maps of the parts' first shapes; or with tapers, where those meet the target as well in fewer bytes.
+/// The maps of the parts' first shapes; or of any, where those meet the target as well in fewer bytes.
 Result<Drawn> draw_smallest(Asset& asset, const std::vector<Piece>& pieces,
                             const std::vector<double>& areas_m2, const MeshQueries& queries,
                             const MapTarget& target, std::uint64_t seed) {
   const std::vector<std::vector<PlacedShape>> shapes = shapes_of(asset, pieces);
   MapDrawer drawer(shapes, areas_m2, queries);
   auto drawn = draw_maps(asset, drawer, 1, queries, target, kSmallEnough, seed);
-  const bool have_tapers =
+  const bool have_others =
       std::any_of(shapes.begin(), shapes.end(), [](const auto& s) { return s.size() > 1; });
-  if (!drawn || !have_tapers) return drawn;
+  if (!drawn || !have_others) return drawn;
   Asset other = asset;
-  // Tapers are to save memory, but not at the price of what exactness small objects have.
+  // Tapers and bends are to save memory, but not at the price of what exactness small objects have.
   const std::size_t fewer = std::clamp(drawn.value().bytes, kSmallEnough / 2, kSmallEnough);
-  auto redrawn = draw_maps(other, drawer, 2, queries, target, fewer, seed);
+  auto redrawn = draw_maps(other, drawer, kAllShapes, queries, target, fewer, seed);
   if (!redrawn) return redrawn;
-  const Drawn &rigid = drawn.value(), &tapered = redrawn.value();
-  const bool meets = tapered.depth_in_aims <= std::max(rigid.depth_in_aims, kAtAims);
+  const Drawn &rigid = drawn.value(), &formed = redrawn.value();
+  const bool meets = formed.depth_in_aims <= std::max(rigid.depth_in_aims, kAtAims);
   // Where the budget decides, bytes are the same and errors differ.
-  const bool gains = rigid.by_budget ? tapered.depth_in_aims < rigid.depth_in_aims
-                                     : !tapered.by_budget && tapered.bytes < rigid.bytes;
+  const bool gains = rigid.by_budget ? formed.depth_in_aims < rigid.depth_in_aims
+                                     : !formed.by_budget && formed.bytes < rigid.bytes;
   if (!meets || !gains) return drawn;
   asset = std::move(other);
   return redrawn;
@@ -319,7 +319,8 @@ Result<BakeResult> bake(const SourceMesh& source, const BakeOptions& asked, cons
     }
   }
   for (std::size_t k = 0; k < pieces.size(); ++k)
-    if (asset.parts[k].shape.taper != 0) result.fits[k] = pieces[k].tapered->fit;
+    for (const FittedPart& other : pieces[k].others)
+      if (other.part.shape == asset.parts[k].shape) result.fits[k] = other.fit;
   if (drawn.value().by_budget) result.stopped_by = "bytes";
   asset.mesh = prepared.record;
   asset.provenance = provenance(source, asked);

@@ -48,25 +48,8 @@ constexpr double kOnSurface = 1e-4;
 constexpr double kNearSurface = 0.02;
 /// Through fewer points than this pass superquadrics that say nothing about the part (any 11 have one).
 constexpr std::size_t kDetermined = std::size_t{3} * fit::kRigidCount;
-/// Tapers are kept below this share of max_taper: at all of it the surface has a crease of no curvature.
-constexpr double kMostTaper = 0.9;
 /// What the corners that no point samples may add to the log-volume of the smallest bound.
 constexpr double kUnsampled = 0.2;
-
-Bounds make_bounds(const FitOptions& options) {
-  Bounds bounds;
-  bounds.lower.setConstant(-4);  // the points lie in the unit ball; a turn stays below 180 degrees
-  bounds.upper.setConstant(4);
-  bounds.lower.segment<3>(fit::kTurn).setConstant(-3);
-  bounds.upper.segment<3>(fit::kTurn).setConstant(3);
-  bounds.lower.segment<3>(fit::kLogAxes).setConstant(std::log(options.min_axis_ratio));
-  bounds.upper.segment<3>(fit::kLogAxes).setConstant(std::log(8.0));
-  bounds.lower.segment<2>(fit::kE1).setConstant(options.min_exponent);
-  bounds.upper.segment<2>(fit::kE1).setConstant(options.max_exponent);
-  bounds.upper[fit::kTaper] = options.taper ? kMostTaper : 0;
-  bounds.lower[fit::kTaper] = -bounds.upper[fit::kTaper];
-  return bounds;
-}
 
 double mean_gap(const Placed& at, const std::vector<Vec3d>& points) {
   const fit::LogBetaModel model(fit::parameters(at), at.part_axes);
@@ -124,7 +107,7 @@ void keep_finalists(std::vector<Candidate>& candidates, std::size_t count) {
 
 Candidate optimise(const Hull& hull, const FitOptions& options) {
   const Effort& effort = options.quick ? kQuick : kFull;
-  const Bounds bounds = make_bounds(options);
+  const Bounds bounds = fit::make_bounds(options);
   std::vector<Vec3d> points = fit::spread_subset(hull, effort.points);
 
   std::vector<Placed> starts = fit::starts(hull, points, bounds, effort.grid);

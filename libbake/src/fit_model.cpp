@@ -8,8 +8,6 @@
 
 #include <Eigen/Geometry>
 
-#include "sqmap/bake/fit.hpp"
-
 namespace sqmap::bake::fit {
 namespace {
 
@@ -55,6 +53,9 @@ Eigen::Matrix3d turned(const Vector& x, const Eigen::Matrix3d& part_axes) {
   return part_axes * Eigen::AngleAxisd(angle, w / angle).toRotationMatrix();
 }
 
+/// Tapers are kept below this share of max_taper: at all of it the surface has a crease of no curvature.
+constexpr double kMostTaper = 0.9;
+
 /// Derivative of max_taper.
 double max_taper_slope(double e1) noexcept {
   return (std::numbers::ln2 / 2 * (1 - e1 / 2) - 0.5) * std::exp2(e1 / 2);
@@ -64,10 +65,28 @@ Superquadric shape_of(const Vector& x) {
   return {{std::exp(x[kLogAxes]), std::exp(x[kLogAxes + 1]), std::exp(x[kLogAxes + 2])},
           x[kE1],
           x[kE2],
-          x[kTaper] * max_taper(x[kE1])};
+          x[kTaper] * max_taper(x[kE1]),
+          {x[kBend], x[kBend + 1]}};
 }
 
 }  // namespace
+
+Bounds make_bounds(const FitOptions& options) {
+  Bounds bounds;
+  bounds.lower.setConstant(-4);  // the points lie in the unit ball; a turn stays below 180 degrees
+  bounds.upper.setConstant(4);
+  bounds.lower.segment<3>(kTurn).setConstant(-3);
+  bounds.upper.segment<3>(kTurn).setConstant(3);
+  bounds.lower.segment<3>(kLogAxes).setConstant(std::log(options.min_axis_ratio));
+  bounds.upper.segment<3>(kLogAxes).setConstant(std::log(8.0));
+  bounds.lower.segment<2>(kE1).setConstant(options.min_exponent);
+  bounds.upper.segment<2>(kE1).setConstant(options.max_exponent);
+  bounds.upper[kTaper] = options.taper ? kMostTaper : 0;
+  bounds.lower[kTaper] = -bounds.upper[kTaper];
+  bounds.lower.segment<2>(kBend).setZero();
+  bounds.upper.segment<2>(kBend).setZero();
+  return bounds;
+}
 
 Vector parameters(const Placed& at) {
   Vector x = Vector::Zero();
@@ -77,6 +96,8 @@ Vector parameters(const Placed& at) {
   }
   x[kE1] = at.shape.e1;
   x[kE2] = at.shape.e2;
+  x[kBend] = at.shape.bend.x;
+  x[kBend + 1] = at.shape.bend.y;
   if (at.shape.taper != 0) x[kTaper] = at.shape.taper / max_taper(at.shape.e1);
   return x;
 }
@@ -92,6 +113,7 @@ LogBetaModel::LogBetaModel(const Vector& x, const Eigen::Matrix3d& part_axes)
       e2_(x[kE2]),
       share_(x[kTaper]),
       taper_(share_ * max_taper(e1_)),
+      bend_{x[kBend], x[kBend + 1]},
       axes_(turned(x, part_axes)),
       turn_jacobian_(right_jacobian(x.segment<3>(kTurn))) {}
 
@@ -99,8 +121,39 @@ Eigen::Vector3d LogBetaModel::local(const Vec3d& point) const noexcept {
   return axes_.transpose() * (Eigen::Vector3d(point.x, point.y, point.z) - centre_);
 }
 
+Eigen::Vector3d LogBetaModel::straight(const Eigen::Vector3d& local) const noexcept {
+  if (bend_.is_none()) return local;
+  const Vec3d q = straightened(bend_, {local.x(), local.y(), local.z()});
+  return {q.x, q.y, q.z};
+}
+
+/// With p(q; k) of bent(), dp = B dq + dp/dk dk: at a fixed p, dq/dk = -B^-1 dp/dk.
+Eigen::Vector2d LogBetaModel::bend_gradient(const Eigen::Vector3d& q,
+                                            Eigen::Vector3d& by_straight) const noexcept {
+  const Eigen::Vector2d bend(bend_.x, bend_.y);
+  const double z = q.z(), lambda = 1 - bend.dot(q.head<2>()), angle = bend.norm() * z, square = angle * angle;
+  // (1 - cos a) / a^2 and sin a / a, and their derivatives over a.
+  constexpr double kSeriesBelow_rad =
+      1e-2;  // there the next terms are below 1e-9, the quotients would cancel
+  const bool series = std::abs(angle) < kSeriesBelow_rad;
+  const double sine = std::sin(angle), cosine = std::cos(angle);
+  const double versine_2 = series ? 0.5 - square / 24 : (1 - cosine) / square;
+  const double sine_1 = series ? 1 - square / 6 : sine / angle;
+  const double versine_slope = series ? -1.0 / 12 + square / 180 : (sine_1 - 2 * versine_2) / square;
+  const double sine_slope = series ? -1.0 / 3 + square / 30 : (cosine - sine_1) / square;
+
+  const Vec3d g = turned(bend_, {q.x(), q.y(), z}, {by_straight.x(), by_straight.y(), by_straight.z()});
+  by_straight = {g.x, g.y, g.z};
+  // p = (q_xy + bend z^2 versine_2 lambda, z sine_1 lambda)
+  const double lean = bend.dot(by_straight.head<2>());
+  Eigen::Vector2d gradient = by_straight.head<2>() * (z * z * versine_2 * lambda);
+  gradient += bend * (z * z * lambda * (z * z * versine_slope * lean + z * sine_slope * by_straight.z()));
+  gradient -= q.head<2>() * (z * z * versine_2 * lean + z * sine_1 * by_straight.z());
+  return -gradient;
+}
+
 double LogBetaModel::value(const Vec3d& point) const noexcept {
-  const Eigen::Vector3d p = local(point);
+  const Eigen::Vector3d p = straight(local(point));
   const Eigen::Vector3d log_p = p.cwiseAbs().cwiseMax(kTiny).array().log().matrix() - log_axes_;
   const double log_u = log_norm(log_p.x(), log_p.y(), e2_).value;
   if (taper_ == 0) return log_norm(log_u, log_p.z(), e1_).value;
@@ -128,7 +181,7 @@ LogBetaModel::Meridian LogBetaModel::meridian(double log_u, double log_w, double
 }
 
 LogBeta LogBetaModel::value_and_gradient(const Vec3d& point) const noexcept {
-  const Eigen::Vector3d p = local(point);
+  const Eigen::Vector3d in_part = local(point), p = straight(in_part);
   const Eigen::Vector3d log_p = p.cwiseAbs().cwiseMax(kTiny).array().log().matrix() - log_axes_;
   const LogNorm parallel = log_norm(log_p.x(), log_p.y(), e2_);
   const Meridian meridian = this->meridian(parallel.value, log_p.z(), p.z());
@@ -143,13 +196,21 @@ LogBeta LogBetaModel::value_and_gradient(const Vec3d& point) const noexcept {
   by_log_p.z() += by_z * p.z();
 
   LogBeta result{meridian.value, {}};
+  result.gradient.segment<2>(kBend).setZero();
+  if (!bend_.is_none()) result.gradient.segment<2>(kBend) = bend_gradient(p, by_p);
   result.gradient.segment<3>(kCentre) = -(axes_ * by_p);
-  result.gradient.segment<3>(kTurn) = turn_jacobian_.transpose() * by_p.cross(p);
+  result.gradient.segment<3>(kTurn) = turn_jacobian_.transpose() * by_p.cross(in_part);
   result.gradient.segment<3>(kLogAxes) = -by_log_p;
   result.gradient[kE1] = meridian.by_e + meridian.by_taper * share_ * max_taper_slope(e1_);
   result.gradient[kE2] = meridian.by_u * parallel.by_e;
   result.gradient[kTaper] = meridian.by_taper * max_taper(e1_);
   return result;
+}
+
+bool may_bend(const Superquadric& shape) noexcept {
+  constexpr double kShare = 0.95;  // what bounding whole triangles may add
+  return shape.bend.curvature() * shape.semi_axes_m.z <= kShare * kMostBendTurn &&
+         bend_reach(shape) <= kShare * kMostBendReach;
 }
 
 double log_volume(const Vector& x) {

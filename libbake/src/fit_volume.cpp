@@ -27,6 +27,11 @@ class InflatedVolume {
     const LogBetaModel model(x, part_axes_);
     for (std::size_t i = 0; i < points_.size(); ++i) log_betas_[i] = model.value(points_[i]);
     log_norm_ = log_p_norm();
+    if (x[kBend] != 0 || x[kBend + 1] != 0) {
+      Superquadric shape = placed(x, part_axes_).shape;
+      shape.semi_axes_m = std::exp(log_norm_) * shape.semi_axes_m;
+      if (!may_bend(shape)) return std::numeric_limits<double>::infinity();
+    }
     return log_volume(x) + 3 * log_norm_;
   }
 
@@ -85,8 +90,13 @@ Vector damped_step(const Objective& model, const Vector& x, const Bounds& bounds
     hessian(i, i) = 1;
     descent[i] = 0;
   }
-  if (!bounds.is_rigid()) return hessian.ldlt().solve(descent);
+  if (!bounds.is_straight()) return hessian.ldlt().solve(descent);
   Vector step = Vector::Zero();
+  if (!bounds.is_rigid()) {
+    step.head<kStraightCount>() =
+        hessian.topLeftCorner<kStraightCount, kStraightCount>().ldlt().solve(descent.head<kStraightCount>());
+    return step;
+  }
   step.head<kRigidCount>() =
       hessian.topLeftCorner<kRigidCount, kRigidCount>().ldlt().solve(descent.head<kRigidCount>());
   return step;
@@ -98,8 +108,9 @@ FitStop minimise(Vector& x, InflatedVolume& objective, const Bounds& bounds, int
   constexpr double kGain = 1e-6;  // of the log-volume: further steps would not show in a part
   constexpr double kMaxDamping = 1e8;
   double damping = 1e-2;
-  objective.value(x);
+  const double first = objective.value(x);
   Objective model = objective.with_derivatives(x);
+  model.value = first;
   for (int k = 0; k < max_iterations; ++k) {
     if (damping >= kMaxDamping) return FitStop::kNoDescent;
     ++iterations;

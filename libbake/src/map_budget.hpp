@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <vector>
 
@@ -16,6 +17,9 @@ struct PlacedShape {
   Superquadric shape;
   Pose object_from_part;
 };
+
+/// For MapDrawer::draw.
+inline constexpr auto kAllShapes = std::numeric_limits<std::size_t>::max();
 
 /// What the maps of an asset should reach and may cost.
 struct MapTarget {

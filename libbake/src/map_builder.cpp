@@ -11,6 +11,8 @@
 
 #include "sqmap/asset/shape_table.hpp"
 
+#include "part_lines.hpp"
+
 namespace sqmap::bake {
 
 namespace {
@@ -111,9 +113,9 @@ double MeshQueries::signed_distance(const Vec3d& p_m, double at_most_m) const {
 
 RayField trace_map(const Superquadric& shape, const Pose& object_from_part, std::uint32_t rows,
                    std::uint32_t cols, const MeshQueries& queries) {
-  const MapGrid grid(shape, rows, cols);
+  const MapGrid grid(straight(shape), rows, cols);
   const Reach reach(shape, grid);
-  const Rotation<double> turn = rotation(object_from_part.orientation);
+  const PartLines part_lines(shape, object_from_part, queries);
   struct Row {
     std::vector<std::uint8_t> start_inside;
     std::vector<std::uint32_t> count;
@@ -122,23 +124,20 @@ RayField trace_map(const Superquadric& shape, const Pose& object_from_part, std:
   std::vector<Row> by_row(rows);
   tbb::parallel_for(tbb::blocked_range<std::uint32_t>(0, rows, 4),
                     [&](const tbb::blocked_range<std::uint32_t>& range) {
-                      std::vector<RayTracer::Ray> rays(cols);
-                      std::vector<std::vector<RayTracer::Hit>> hits_of(cols);
+                      std::vector<RayTracer::Ray> lines(cols);
+                      PartLines::Traced traced;
                       for (std::uint32_t row = range.begin(); row != range.end(); ++row) {
                         Row& out = by_row[row];
                         for (std::uint32_t col = 0; col < cols; ++col)
-                          rays[col] = {turn.apply(grid.point(row, col)) + object_from_part.translation_m,
-                                       -turn.apply(grid.normal(row, col))};
-                        queries.rays.trace_lines(rays, hits_of);
+                          lines[col] = {grid.point(row, col), -grid.normal(row, col)};
+                        part_lines.trace(lines, traced);
                         for (std::uint32_t col = 0; col < cols; ++col) {
-                          const auto& [p_m, inward] = rays[col];
-                          const std::vector<RayTracer::Hit>& hits = hits_of[col];
-                          int winding = queries.winding(p_m, inward, hits);
+                          int winding = traced.winding[col];
                           const double reach_m = reach.at(row, col);
                           out.start_inside.push_back(winding > 0 ? 1 : 0);
                           out.reach_m.push_back(reach_m);
                           std::uint32_t count = 0;
-                          for (const auto& hit : hits) {
+                          for (const auto& hit : traced.hits[col]) {
                             if (hit.t_m < 0) continue;
                             const bool was_inside = winding > 0;
                             winding += hit.entering ? 1 : -1;
@@ -304,6 +303,7 @@ DistanceMap quantise(const RayField& field, const MapPlan& plan) {
 void add_vertex_samples(Part& part, const MeshQueries& queries, double tolerance_m) {
   DistanceMap& map = part.map;
   const ShapeTable<double> table(part.shape, map.rows, map.cols);
+  const PartLines lines(part.shape, part.object_from_part, queries);
   const Rotation<double> turn = rotation(part.object_from_part.orientation);
   struct Best {
     double miss_m{};
@@ -314,8 +314,9 @@ void add_vertex_samples(Part& part, const MeshQueries& queries, double tolerance
   for (const Vec3d& vertex_m : queries.mesh.vertices_m) {
     const Vec3d from_centre = vertex_m - part.sphere.centre_m;
     if (dot(from_centre, from_centre) > part.sphere.radius_m * part.sphere.radius_m) continue;
-    const Vec3d m = turn.apply_inverse(vertex_m - part.object_from_part.translation_m);
-    if (!(inside_outside_radial(part.shape, m) <= 1)) continue;
+    const Vec3d m =
+        straightened(part.shape.bend, turn.apply_inverse(vertex_m - part.object_from_part.translation_m));
+    if (!(inside_outside_radial(straight(part.shape), m) <= 1)) continue;
     // Solve r(row, col) - D n(row, col) = m, from the foot point.
     const Foot<double> foot = table.foot(m);
     double row = foot.row, col = foot.col, depth_m = foot.depth_m;
@@ -356,8 +357,7 @@ void add_vertex_samples(Part& part, const MeshQueries& queries, double tolerance
     if (!(code >= 0 && code < map.miss_code())) continue;
     // Visible: the first crossing of the vertex's own ray is the vertex (paper Fig. 5a, point W is not).
     const SurfaceSample<double> r = table.sample(row, col);
-    queries.rays.trace(turn.apply(r.point_m) + part.object_from_part.translation_m, turn.apply(-r.normal),
-                       hits);
+    lines.trace(r.point_m, -r.normal, hits);
     if (hits.empty() || hits.front().t_m < depth_m - 0.5 * tolerance_m) continue;
     best[corner[0]] = {
         missed_m,

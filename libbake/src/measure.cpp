@@ -12,6 +12,8 @@
 
 #include "sqmap/asset/shape_table.hpp"
 
+#include "part_lines.hpp"
+
 namespace sqmap::bake {
 
 namespace {
@@ -73,17 +75,18 @@ std::vector<Probe> probe(const Asset& asset, const ShellPoints& shell, const Mes
   tbb::parallel_for(std::size_t{0}, asset.parts.size(), [&](std::size_t k) {
     const Part& part = asset.parts[k];
     const ShapeTable<double> table(part.shape, part.map.rows, part.map.cols);
+    const PartLines lines(part.shape, part.object_from_part, queries);
     const Rotation<double> turn = rotation(part.object_from_part.orientation);
     const Vec3d half_m = half_extents_m(part.shape);
     std::vector<RayTracer::Hit> hits;
     for (const Vec3f& point : shell.points_m) {
-      const Vec3d m = turn.apply_inverse(cast<double>(point) - part.object_from_part.translation_m);
+      const Vec3d m = straightened(
+          part.shape.bend, turn.apply_inverse(cast<double>(point) - part.object_from_part.translation_m));
       const bool in_box = std::abs(m.x) <= half_m.x && std::abs(m.y) <= half_m.y && std::abs(m.z) <= half_m.z;
-      if (!in_box || !(inside_outside_radial(part.shape, m) <= 1)) continue;
+      if (!in_box || !(inside_outside_radial(straight(part.shape), m) <= 1)) continue;
       const Foot<double> foot = table.foot(m);
       const SurfaceSample<double> r = table.sample(foot.row, foot.col);
-      queries.rays.trace(turn.apply(r.point_m) + part.object_from_part.translation_m, turn.apply(-r.normal),
-                         hits);
+      lines.trace(r.point_m, -r.normal, hits);
       if (!hits.empty()) by_part[k].push_back({static_cast<std::uint32_t>(k), foot, hits.front().t_m});
     }
   });

@@ -31,6 +31,10 @@ Outcome BakeOptions::check() const {
   if (!(repair.weld_tolerance >= 0 && repair.weld_tolerance < 0.1)) {
     return bad("repair.weld_tolerance", repair.weld_tolerance, "in [0, 0.1)");
   }
+  if (conservative && fit.bend)
+    return Error{Status::kBadOption,
+                 "bounds of the surface are for straight superquadrics, not for bent ones",
+                 "bake conservatively, or with bends"};
   if (auto outcome = decompose.check(); !outcome) return outcome;
   return fit.check();
 }
@@ -60,7 +64,7 @@ std::string BakeOptions::to_json() const {
   const auto& [policy, weld_tolerance, max_hole_edges] = repair_options;
   const auto& [source_count, window, locale_width, boundary_strength, min_hull_gain, k_h, t_h,
                use_boundary_strength, use_hyperbolic, join_components, min_part_area] = decompose_options;
-  const auto& [min_exponent, max_exponent, max_iterations, min_axis_ratio, quick, taper] = fit_options;
+  const auto& [min_exponent, max_exponent, max_iterations, min_axis_ratio, quick, taper, bend] = fit_options;
   nlohmann::json json = {
       {"max_error_percent", error_percent},
       {"max_error_m", error_m},
@@ -94,6 +98,7 @@ std::string BakeOptions::to_json() const {
   };
   // Named where they decide bytes.
   if (taper) json["fit"]["taper"] = true;
+  if (bend) json["fit"]["bend"] = true;
   if (with_bounds) json["conservative"] = true;
   return json.dump();
 }

@@ -5,10 +5,12 @@
 #include <cmath>
 #include <utility>
 
+#include "fit_bend.hpp"
+
 namespace sqmap::bake {
 
 BoundingSphere sphere_of(const Superquadric& shape, const Pose& object_from_part) {
-  return {object_from_part.translation_m, bounding_radius_m(shape)};
+  return bounding_sphere(shape, object_from_part);
 }
 
 Result<FittedPart> fit_part(const SolidSet& set, const Solid& solid, const FitOptions& options) {
@@ -33,6 +35,22 @@ Result<FittedPart> fit_part(const SolidSet& set, const Solid& solid, const FitOp
   part.sphere = sphere_of(part.shape, part.object_from_part);
   part.volume_m3 = set.volume_m3(solid);
   return FittedPart{std::move(part), {iterations, fit.value().stop}};
+}
+
+std::optional<FittedPart> bend_part(const SolidSet& set, const Solid& solid, const FittedPart& straight,
+                                    const FitOptions& options) {
+  Fit start;
+  start.shape = straight.part.shape;
+  start.object_from_part = straight.part.object_from_part;
+  start.volume_m3 = volume_m3(start.shape);
+  start.iterations = straight.fit.iterations;
+  const auto fit = fit_bent(set.vertices_m, solid.triangles, start, options);
+  if (!fit) return std::nullopt;
+  FittedPart bent{straight.part, {fit->iterations, fit->stop}};
+  bent.part.shape = fit->shape;
+  bent.part.object_from_part = fit->object_from_part;
+  bent.part.sphere = sphere_of(fit->shape, fit->object_from_part);
+  return bent;
 }
 
 double draft_map(Part& part, const MeshQueries& queries, std::uint32_t quadrant_cells) {

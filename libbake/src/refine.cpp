@@ -65,9 +65,13 @@ Outcome fit_pieces(const SolidSet& set, std::vector<Piece>& pieces, const FitOpt
   tbb::parallel_for(std::size_t{0}, pieces.size(), [&](std::size_t k) {
     if (options.taper) {
       if (auto tapered = fit_part(set, pieces[k].held, options))
-        pieces[k].tapered = std::move(tapered).value();
+        pieces[k].others.push_back(std::move(tapered).value());
     }
     auto fitted = fit_part(set, pieces[k].held, rigid);
+    if (options.bend && fitted) {
+      if (auto bent = bend_part(set, pieces[k].held, fitted.value(), options))
+        pieces[k].others.push_back(std::move(*bent));
+    }
     if (fitted) {
       pieces[k].quick = FittedPart{std::move(pieces[k].part), pieces[k].fit};
       pieces[k].quick->part.map = {};

@@ -27,7 +27,7 @@ struct Piece {
   double loss_m{};                             ///< draft_map()
   double area_m2{};                            ///< surface of the mesh in the cell
   std::optional<FittedPart> quick;             ///< a quick fit, once `part` is the full one
-  std::optional<FittedPart> tapered;           ///< the full fit of FitOptions::taper
+  std::vector<FittedPart> others;              ///< the full fits of FitOptions::taper and bend
   std::optional<std::vector<HalfSpace>> cuts;  ///< planes to split it by, best first
   std::size_t cuts_tried{};                    ///< of them, those that did not pay
   std::optional<Spare> spare;                  ///< of those, the one that cost least

@@ -40,7 +40,7 @@ class Holder {
     const double reach_m = other.sphere.radius_m + part_.sphere.radius_m;
     return dot(d, d) <= reach_m * reach_m;
   }
-  /// All of a triangle: the superquadric is convex.
+  /// All of a triangle: the superquadrics of quick fits are straight, hence convex.
   bool holds(const std::array<std::uint32_t, 3>& triangle) const {
     return std::all_of(triangle.begin(), triangle.end(), [&](std::uint32_t v) { return holds(v); });
   }

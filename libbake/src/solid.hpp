@@ -23,7 +23,8 @@ struct HalfSpace {
 /// Every cut is closed by cones over the connected pieces of its boundary, and the two sides get the same
 /// cones with opposite orientation. So the winding numbers of the parts add up to that of the mesh: a point
 /// inside the mesh is inside at least one part's solid, hence inside that part's convex hull, hence inside
-/// its superquadric. No embedding of the caps is needed for this, and none is checked.
+/// its superquadric; a bent one holds the solid's triangles, and around a ball that holds a closed chain all
+/// winding numbers are 0. No embedding of the caps is needed for this, and none is checked.
 struct Solid {
   std::vector<std::array<std::uint32_t, 3>> triangles;  ///< indices into SolidSet::vertices_m
   std::vector<std::uint32_t> face;                      ///< mesh face of each triangle; kNewFace: a cap

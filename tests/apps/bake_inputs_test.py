@@ -253,8 +253,8 @@ class Settings(FolderTest):
 
     def test_config_show_prints_every_setting_with_its_source(self):
         text = run("sqbake", "config", "show", self.mesh, "--timeout", "5m").stdout
-        for name in ("unit", "up", "repair", "quality", "max-error", "max-parts", "max-bytes", "conservative", "taper", "memory",
-                     "fallback"):
+        for name in ("unit", "up", "repair", "quality", "max-error", "max-parts", "max-bytes", "conservative", "taper", "bend",
+                     "memory", "fallback"):
             self.assertRegex(text, rf"(?m)^  {name} +\S+ +built in$")
         self.assertRegex(text, r"(?m)^  timeout +5m +command line$")
         columns = {re.match(r"  \S+ +", line).end() for line in text.splitlines()[1:]}

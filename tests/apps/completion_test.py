@@ -56,6 +56,7 @@ class Documents(FolderTest):
         (self.folder / "fine.off").touch()
         words = {"sqbake bake x.off --quality ": {"draft", "standard", "fine"},
                  "sqbake bake x.off --quality f": {"fine"}, "sqbake bake x.off --taper ": {"on", "off"},
+                 "sqbake bake x.off --bend ": {"on", "off"},
                  "sqbake cache stats --format ": {"text", "json"}, "sqinfo query x.h5 --layer ": {"auto", "1", "2", "3"},
                  "sqinfo show --color a": {"auto", "always"}}
         for line, expected in words.items():

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The bounding promise, checked by scripts/check_containment, and that this check can fail."""
+import json
 import os
 import re
 import subprocess
@@ -60,6 +61,15 @@ class SampleMeshes(Checked):
         result = self.check(bundle, mesh)
         self.assertEqual(result.returncode, 0, result.stdout + result.stderr)
         self.assertLess(float(re.search(r"is ([\d.]+) times the mesh's volume", result.stdout)[1]), 1.65)
+
+    def test_bends_hold_it_too(self):
+        mesh = os.path.join(os.environ["SQMAP_MESH_DIR"], "elephant.off")
+        bundle = self.folder / "bent.h5"
+        self.assert_exit(run("sqbake", "bake", mesh, "-o", bundle, "--bend", "on"), 0)
+        parts = json.loads(run("sqinfo", "show", bundle, "--format", "json").stdout)["parts"]
+        self.assertGreater(sum(any(part["bend_per_m"]) for part in parts), 2)
+        result = self.check(bundle, mesh)
+        self.assertEqual(result.returncode, 0, result.stdout + result.stderr)
 
 
 if __name__ == "__main__":

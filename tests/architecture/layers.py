@@ -52,7 +52,7 @@ THIRD_PARTY = {
     "Ceres": (("ceres/", "glog/"), ["libbake/src/fit_surface.cpp"]),
     "Eigen": (("Eigen/", "unsupported/"), ["libbake/src/fit.cpp", "libbake/src/fit_model.cpp",
                                            "libbake/src/fit_model.hpp", "libbake/src/fit_starts.cpp",
-                                           "libbake/src/fit_volume.cpp", "libbake/src/heat_method.cpp",
+                                           "libbake/src/fit_volume.cpp", "libbake/src/fit_bend.cpp", "libbake/src/heat_method.cpp",
                                            "libbake/src/partition.cpp"]),
     "assimp": (("assimp/",), ["libbake/src/scene_reader.cpp", "apps/common/source_mesh.cpp"]),
     "Embree": (("embree",), ["libbake/src/mesh_boxes.cpp", "apps/sqbench/embree_closest.cpp", VERSIONS]),

@@ -282,6 +282,7 @@ TEST(Bake, WritesDownEveryOptionThatDecidesTheBytes) {
   EXPECT_TRUE(changes([](BakeOptions& o) { o.decompose.join_components = true; }));
   EXPECT_TRUE(changes([](BakeOptions& o) { o.fit.quick = true; }));
   EXPECT_TRUE(changes([](BakeOptions& o) { o.fit.taper = true; }));
+  EXPECT_TRUE(changes([](BakeOptions& o) { o.fit.bend = true; }));
   EXPECT_TRUE(changes([](BakeOptions& o) { o.read.up = UpAxis::kY; }));
   EXPECT_TRUE(changes([](BakeOptions& o) { o.repair.max_hole_edges = 7; }));
   EXPECT_TRUE(changes([](BakeOptions& o) { o.seed = 2; }));

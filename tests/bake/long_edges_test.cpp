@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "long_edges.hpp"
 
+#include <algorithm>
+#include <cmath>
 #include <map>
 
 #include <gtest/gtest.h>
@@ -49,6 +51,20 @@ TEST(LongEdges, StopAtTheFaceLimit) {
   const FineTriangles fine = split_long_edges(triangles_of(test::box({1, 1, 1})), 1e-3, 1000);
   EXPECT_GT(fine.triangles.faces.size(), 12U);
   EXPECT_LE(fine.triangles.faces.size(), 4000U);
+}
+
+// What is long in one direction alone would be cut into ever thinner slivers for ever, were it cut itself.
+TEST(LongEdges, EndWhereOnlyOneDirectionCounts) {
+  const auto is_long = [](const Vec3d& a, const Vec3d& b) {
+    return std::abs(a.x - b.x) > 0.02 ||
+           (std::min(a.z, b.z) < 0 && norm(b - a) > 0.3 && std::max(a.z, b.z) > 0);
+  };
+  const FineTriangles fine = split_edges(triangles_of(test::cone(0.5, 1.0, 12)), is_long, 200000);
+  EXPECT_LT(fine.triangles.faces.size(), 200000U);
+  EXPECT_GT(fine.triangles.faces.size(), 500U);
+  for (const auto& face : fine.triangles.faces)
+    for (int k = 0; k < 3; ++k)
+      EXPECT_FALSE(is_long(fine.triangles.points[face[k]], fine.triangles.points[face[(k + 1) % 3]]));
 }
 
 }  // namespace

@@ -20,6 +20,9 @@ struct FitOptions {
   /// comparing candidate cuts; the parts of an asset deserve the full fit.
   bool quick = false;
   bool taper = false;  ///< tapered superquadrics too, as far as they are convex: within 0.9 max_taper(e1)
+  /// Bent ones too, where they are smaller; of the parts of an asset only: fit_superquadric, which sees
+  /// points and no triangles between them, takes no notice.
+  bool bend = false;
 
   /// kBadOption: exponents outside [kMinExponent, kMaxExponent] or out of order, max_iterations < 1,
   /// min_axis_ratio outside [1e-6, 1]. NaN is outside of everything.
