@@ -54,7 +54,7 @@ HWY_INLINE V3 turned(const PartBend& bend, const VTurn& turn, const V3& v, V alo
           (all(1.0F) - turn.versine) * along - turn.sine * across};
 }
 
-/// shape_normal() of chart.hpp.
+/// shape_normal() of part_shape.hpp.
 SQMAP_KERNEL V3 shape_normal_of(const PartRecord& part, const V3& p_part) {
   const V3 p = straightened(part.bend, p_part);
   const V zero = hn::Zero(kD), one = all(1.0F);

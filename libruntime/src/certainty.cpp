@@ -4,8 +4,8 @@
 // tolerance: a sure answer is the truth about a point that near (FORMAT.md 3.1).
 #include "certainty.hpp"
 
-#include "chart.hpp"
 #include "combine.hpp"
+#include "part_shape.hpp"
 
 namespace sqmap::runtime {
 namespace {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The scalar reference of layers 1, 2 and 3 on one part. The SIMD engine (lanes.inl, look.inl) follows it
+// The scalar reference of layers 2 and 3 on one part. The SIMD engine (lanes.inl, look.inl) follows it
 // operation by operation and gives the same bits: change both. Part frame; lengths in units of
 // Resident::unit_m.
 #pragma once
@@ -15,9 +15,7 @@
 
 #include "certainty.hpp"
 #include "part_bend.hpp"
-#include "powers.hpp"
 #include "resident.hpp"
-#include "triangle.hpp"
 
 namespace sqmap::runtime {
 
@@ -81,52 +79,6 @@ inline Vec3f outward_at(const Vec3f& out, const Vec3f& normal, float blur, bool 
   const bool turns = up * up > 0.25F * square && square > 4.0F * (blur * blur);
   const bool holds = up < 0 ? !turns : on_rim;
   return holds ? normal : normalized(out + blur * normal);
-}
-
-/// By how much a tapered part is narrower than its box at z, |z| <= a3; 1 of a rigid one.
-inline float narrowing_at(const PartRecord& part, float z) noexcept {
-  return (1.0F + std::abs(part.taper)) / (1.0F + part.taper * (z * part.inverse_extents.z));
-}
-
-/// Layer 1: F(p) <= 1 (FORMAT.md S1), from powers of the unit coordinates.
-inline bool in_superquadric(const PartRecord& part, const Vec3f& p_part) noexcept {
-  const Vec3f p = part.bend.straightened(p_part);
-  float x = std::abs(p.x) * part.inverse_extents.x, y = std::abs(p.y) * part.inverse_extents.y;
-  const float z = std::abs(p.z) * part.inverse_extents.z;
-  if (!(x <= 1.0F && y <= 1.0F && z <= 1.0F)) return false;
-  if (part.taper != 0) {
-    const float narrowing = narrowing_at(part, p.z);
-    x *= narrowing;
-    y *= narrowing;
-  }
-  const float across = power_of(x, part.power_2) + power_of(y, part.power_2);
-  return power_of(across, part.power_ratio) + power_of(z, part.power_1) <= 1.0F;
-}
-
-/// Outward unit normal, at p_part in the part, of the superquadric with the same axis, taper, bend and a3 to
-/// which it belongs; zero at the centre.
-inline Vec3f shape_normal(const PartRecord& part, const Vec3f& p_part) noexcept {
-  const Vec3f p = part.bend.straightened(p_part);
-  const float narrowing = narrowing_at(part, p.z);
-  const float b_x = part.inverse_extents.x * narrowing, b_y = part.inverse_extents.y * narrowing,
-              b_z = part.inverse_extents.z;
-  const float x = std::abs(p.x) * b_x, y = std::abs(p.y) * b_y, z = std::abs(p.z) * b_z;
-  const float most = greater(x, y);
-  float u = 0, normal_x = 0, normal_y = 0;
-  if (most > 0) {
-    const float u_x = x / most, u_y = y / most;
-    const float size = power_of(power_of(u_x, part.power_2) + power_of(u_y, part.power_2), 1 / part.power_2);
-    u = most * size;
-    normal_x = power_of(u_x / size, part.power_2 - 1);
-    normal_y = power_of(u_y / size, part.power_2 - 1);
-  }
-  const float scale = greater(u, z);
-  if (!(scale > 0)) return {};
-  const float rim = power_of(u / scale, part.power_1 - 1);
-  const float lean = (part.taper * (narrowing / (1.0F + std::abs(part.taper)))) * (rim * u) * b_z;
-  const Vec3f gradient{std::copysign(rim * normal_x * b_x, p.x), std::copysign(rim * normal_y * b_y, p.y),
-                       std::copysign(power_of(z / scale, part.power_1 - 1) * b_z, p.z) - lean};
-  return normalized(part.bend.is_none() ? gradient : part.bend.gradient(part.bend.turn_at(p), gradient));
 }
 
 class Chart {
@@ -433,171 +385,6 @@ inline bool Chart::patch_point(float row, float col, Vec3f& point) const noexcep
   return cell.eligible;
 }
 
-inline Chart::Start Chart::start_at(const Vec3f& p, float row, float col,
-                                    std::uint32_t stride) const noexcept {
-  Start start{row, col, std::numeric_limits<float>::infinity()};
-  const Cell cell = cell_at(row, col, stride);
-  if (!cell.eligible) return start;
-  const Vec3f error = p - patch_at(cell, row, col, stride).point;
-  start.square = dot(error, error);
-  return start;
-}
-
-inline Chart::Start Chart::start_beside(const Vec3f& p, float row, float col,
-                                        std::uint32_t stride) const noexcept {
-  const auto size = static_cast<float>(stride);
-  const Cell middle = cell_at(row, col, stride);
-  const float mid_row = static_cast<float>(middle.row) + size / 2,
-              mid_col = static_cast<float>(middle.col) + size / 2;
-  Start best;
-  for (int ring = 0; ring < kRings && !std::isfinite(best.square); ++ring) {
-    const auto step = static_cast<float>(stride << ring);
-    for (int k = 0; k < 9; ++k) {
-      if (k == 4) continue;  // the middle
-      const int rows_up = k / 3 - 1;
-      const float here_row = mid_row + static_cast<float>(rows_up) * step;
-      const float here_col = wrapped(mid_col + static_cast<float>(k % 3 - 1) * step);
-      if (!(here_row > 0 && here_row < static_cast<float>(part_.rows - 1) && here_col >= 0)) continue;
-      const Start start = start_at(p, here_row, here_col, stride);
-      if (start.square < best.square) best = start;
-    }
-  }
-  return best;
-}
-
-inline Chart::Start Chart::start_named(const Vec3f& p, std::uint32_t stride) const noexcept {
-  const Vec3f straight = part_.bend.straightened(p);
-  Start best;
-  for (int k = 0; k < StartTable::kAround; ++k) {
-    const std::uint16_t name = resident_.start(part_, straight, k);
-    if (name == StartTable::kNone) continue;
-    const Start start = start_at(p, part_.starts.place(name >> 8U), part_.starts.place(name & 255U), stride);
-    if (start.square < best.square) best = start;
-  }
-  return best;
-}
-
-inline Chart::Step Chart::step_towards(const Patch& patch, const Vec3f& error,
-                                       std::uint32_t stride) const noexcept {
-  const float a = dot(patch.row, patch.row), b = dot(patch.row, patch.col), c = dot(patch.col, patch.col);
-  const float f = dot(patch.row, error), g = dot(patch.col, error);
-  const float product = a * c, determinant = product - b * b;
-  const bool regular = determinant > kLeastAngle * product;
-  const bool rows_only = !regular && a > 0;  // a pole: columns have no length
-  const float inverse = 1.0F / (regular ? determinant : rows_only ? a : 1.0F);
-  const float d_row = regular ? (c * f - b * g) * inverse : rows_only ? f * inverse : 0.0F;
-  const float d_col = regular ? (a * g - b * f) * inverse : 0.0F;
-  // Beside a pole, where columns are short, as far as the rows may go.
-  const float most_row = kMostCells * static_cast<float>(stride);
-  const float slimness =
-      std::sqrt(a / greater(greater(c, kLeastAngle * a), std::numeric_limits<float>::min()));
-  const float most_col = lesser(static_cast<float>(part_.cols) * 0.125F, most_row * greater(slimness, 1.0F));
-  Step step{lesser(greater(d_row, -most_row), most_row), lesser(greater(d_col, -most_col), most_col), 0, {}};
-  step.gain = f * step.row + g * step.col;
-  step.way = step.row * patch.row + step.col * patch.col;
-  return step;
-}
-
-inline void Chart::third_layer(const Vec3f& p, std::uint32_t stride, ChartAnswer& answer) const noexcept {
-  const auto last_row = static_cast<float>(part_.rows - 1), turn = static_cast<float>(part_.cols);
-  const auto size = static_cast<float>(stride);
-  const float last_col = std::nextafter(turn, 0.0F);
-  float row = answer.row, col = answer.col;
-  Cell cell = cell_at(row, col, stride);
-  Patch patch = patch_at(cell, row, col, stride);
-  Vec3f error = p - patch.point, point = patch.point;
-  float square = dot(error, error);
-  bool on_rim = false;
-  Step ahead = step_towards(patch, error, stride);
-  // Always from the nearest place so far; a step that leads away from it is taken again, shorter.
-  for (int step = 0; step < kThirdLayerSteps; ++step) {
-    if (is_over(ahead, square)) break;
-    float next_row = lesser(greater(row + ahead.row, 0.0F), last_row);
-    float next_col = wrapped(col + ahead.col);
-    Cell next = cell_at(next_row, next_col, stride);
-    bool stays = !next.eligible;
-    if (stays) {  // half the way, where that is another cell
-      const float half_row = lesser(greater(row + 0.5F * ahead.row, 0.0F), last_row);
-      const float half_col = wrapped(col + 0.5F * ahead.col);
-      const Cell between = cell_at(half_row, half_col, stride);
-      if (between.eligible && between.texel[0] != cell.texel[0]) {
-        next = between;
-        next_row = half_row;
-        next_col = half_col;
-        stays = false;
-      }
-    }
-    if (stays) {  // on the rim of the patch
-      const auto low_row = static_cast<float>(cell.row), low_col = static_cast<float>(cell.col);
-      next = cell;
-      next_row = lesser(greater(row + ahead.row, low_row), low_row + size);
-      next_col = lesser(greater(col + ahead.col, low_col), low_col + size);
-      if (std::abs(next_row - row) + std::abs(next_col - col) < kLeastCellStep) break;
-      next_col = lesser(next_col, last_col);
-    }
-    patch = patch_at(next, next_row, next_col, stride);
-    error = p - patch.point;
-    if (dot(error, error) < square) {
-      square = dot(error, error);
-      point = patch.point;
-      cell = next;
-      row = next_row;
-      col = next_col;
-      on_rim = stays;
-      ahead = step_towards(patch, error, stride);
-    } else {
-      ahead.row *= kBackStep;
-      ahead.col *= kBackStep;
-      ahead.gain *= kBackStep;
-      ahead.way = kBackStep * ahead.way;
-    }
-  }
-  // What is left of the way needs no look at the map.
-  if (!on_rim && is_over(ahead, square)) {
-    const Vec3f further = point + ahead.way;
-    const Vec3f rest = p - further;
-    if (dot(rest, rest) < square) {
-      square = dot(rest, rest);
-      point = further;
-    }
-  }
-  answer.distance = std::sqrt(square);
-  answer.surface = point;
-  answer.faces_patch = !on_rim;
-  answer.row = row;
-  answer.col = col;
-  answer.normal = patch_across(cell, row, col, stride);
-  answer.refined = true;
-  if (stride == 1) vertex_fan(p, cell, answer);
-}
-
-inline bool Chart::vertex_fan(const Vec3f& p, const Cell& cell, ChartAnswer& answer) const noexcept {
-  const std::uint32_t position = resident_.find(part_.fans, cell.texel[0]);
-  if (position >= part_.fans.count || resident_.key(part_.fans, position) != cell.texel[0]) return false;
-  const std::uint32_t where = resident_.fan_place(part_, position);
-  const auto low = static_cast<float>(cell.row), left = static_cast<float>(cell.col);
-  const float top = low + 1.0F, right = left + 1.0F;
-  const Vec3f apex = place(low + static_cast<float>(where & 255U) * (1 / 256.0F),
-                           left + static_cast<float>(where >> 8U) * (1 / 256.0F),
-                           part_.depth_of(resident_.fan_code(part_, position)));
-  // Corners counter-clockwise seen from outside: rows grow upwards, columns to the right.
-  const Vec3f corner[4] = {place(low, left, cell.depth[0]), place(low, right, cell.depth[1]),
-                           place(top, right, cell.depth[3]), place(top, left, cell.depth[2])};
-  float best_square = std::numeric_limits<float>::infinity();
-  for (int k = 0; k < 4; ++k) {
-    const Vec3f& a = corner[k];
-    const Vec3f& b = corner[(k + 1) % 4];
-    const Vec3f nearest = nearest_on_triangle(p, a, b, apex);
-    const Vec3f d = p - nearest;
-    const float square = dot(d, d);
-    if (square < best_square) {
-      best_square = square;
-      answer.surface = nearest;
-      answer.normal = cross(b - a, apex - a);
-    }
-  }
-  answer.distance = std::sqrt(best_square);
-  return true;
-}
-
 }  // namespace sqmap::runtime
+
+#include "chart_search.hpp"  // IWYU pragma: keep

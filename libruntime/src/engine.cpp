@@ -15,6 +15,7 @@
 #include "body_data.hpp"
 #include "chart.hpp"
 #include "entries.hpp"
+#include "powers.hpp"
 
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
 #define SQMAP_SANITIZED

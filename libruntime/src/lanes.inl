@@ -101,7 +101,7 @@ SQMAP_KERNEL V exp2_of(V x) {
 }
 HWY_INLINE V power_of(V x, float k) { return exp2_of(all(k) * log2_of(x)); }
 
-/// narrowing_at() of chart.hpp.
+/// narrowing_at() of part_shape.hpp.
 HWY_INLINE V narrowing_of(const PartRecord& part, V z) {
   return all(1.0F + std::abs(part.taper)) / (all(1.0F) + all(part.taper) * (z * all(part.inverse_extents.z)));
 }
@@ -173,10 +173,10 @@ HWY_INLINE void cubics_of(const CurveCells& cells, const std::int32_t* cell, VI 
   }
 #elif HWY_TARGET == HWY_SCALAR
   (void)k;
-  for (int i = 0; i < 4; ++i) cubic[i] = all(cells.of[8 * cell[0] + first + i]);
+  for (int i = 0; i < 4; ++i) cubic[i] = all(cells.of[std::ptrdiff_t{8} * cell[0] + first + i]);
 #else
   (void)k;
-  const auto row = [&](int lane) HWY_ATTR { return cells.of + 8 * cell[lane] + first; };
+  const auto row = [&](int lane) HWY_ATTR { return cells.of + std::ptrdiff_t{8} * cell[lane] + first; };
   V rows[4];  // of lanes i, i + 4, ..: a block of four each
   for (int i = 0; i < 4; ++i) {
 #if HWY_TARGET == HWY_AVX2

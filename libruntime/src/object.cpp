@@ -10,6 +10,7 @@
 #include "chart.hpp"
 #include "combine.hpp"
 #include "engine.hpp"
+#include "part_shape.hpp"
 #include "resident.hpp"
 
 namespace sqmap::runtime {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Layer 3 of Chart (chart.hpp) for the entries of one part. Most searches end within two steps; those that do
-// not are gathered from all vectors and go on together.
+// Layer 3 of Chart (chart_search.hpp) for the entries of one part. Most searches end within two steps; those
+// that do not are gathered from all vectors and go on together.
 
 /// Searches under way: Chart::third_layer. The next step starts from the nearest place so far.
 struct Walk {

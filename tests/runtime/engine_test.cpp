@@ -14,6 +14,7 @@
 #include "sqmap/runtime/object.hpp"
 
 #include "chart.hpp"
+#include "part_shape.hpp"
 #include "resident.hpp"
 #include "support/mixed_asset.hpp"
 
