@@ -53,6 +53,8 @@ inline constexpr float kLeastCellStep = 0.05F;
 /// Nor is a step worth its while that brings the point nearer by less than this share of a depth step, as its
 /// linear model foretells: the map knows no better.
 inline constexpr float kLeastGain = 0.06F;
+/// A second search must end nearer than the first by this: the first knows better where both found one place.
+inline constexpr float kNearer = 0.999F;
 /// Rings of eight cells, 2^ring cells away, around a foot whose cell bounds no patch.
 inline constexpr int kRings = 4;
 
@@ -128,6 +130,8 @@ class Chart {
   Start start_beside(const Vec3f& p, float row, float col, std::uint32_t stride) const noexcept;
   /// The nearest of the places that the table of starts names around p.
   Start start_named(const Vec3f& p, std::uint32_t stride) const noexcept;
+  /// The place that the box names which p lies in, unless it is near this one.
+  Start start_away(const Vec3f& p, float row, float col, std::uint32_t stride) const noexcept;
   Patch patch_at(const Cell& cell, float row, float col, std::uint32_t stride) const noexcept;
   /// Outwards across the represented surface at (row, col) of the cell; of no certain length.
   Vec3f patch_across(const Cell& cell, float row, float col, std::uint32_t stride) const noexcept {
@@ -175,15 +179,16 @@ inline Chart::Cell Chart::cell_at(float row, float col, std::uint32_t stride) co
   Cell cell;
   cell.row =
       std::min(static_cast<std::uint32_t>(greater(row, 0.0F)) / stride * stride, part_.rows - 1 - stride);
-  cell.col = std::min(static_cast<std::uint32_t>(greater(col, 0.0F)), part_.cols - 1) / stride * stride;
+  cell.col = std::min(static_cast<std::uint32_t>(greater(col, 0.0F)), part_.cols - 1U) / stride * stride;
   const std::uint32_t next_col = cell.col + stride < part_.cols ? cell.col + stride : 0;
   cell.texel[0] = cell.row * part_.cols + cell.col;
   cell.texel[1] = cell.row * part_.cols + next_col;
   cell.texel[2] = cell.texel[0] + stride * part_.cols;
   cell.texel[3] = cell.texel[1] + stride * part_.cols;
   cell.eligible = true;
+  const MapRow low = resident_.row(part_, cell.row), high = resident_.row(part_, cell.row + stride);
   for (int k = 0; k < 4; ++k) {
-    const std::uint32_t texel = resident_.texel(part_, cell.texel[k]);
+    const std::uint32_t texel = resident_.texel(part_, k < 2 ? low : high, k % 2 == 0 ? cell.col : next_col);
     cell.code[k] = texel & part_.miss_code();
     cell.starts[k] = texel > part_.miss_code();
     cell.depth[k] = part_.depth_of(cell.code[k]);
@@ -241,12 +246,15 @@ inline ChartAnswer Chart::look(const Vec3f& p, bool third, std::uint32_t level, 
       // A crossing that is on no patch stands where it is nearer.
       if (!answer.has_point || refined.distance < answer.distance) answer = refined;
     }
-    if (answer.inside && answer.bounds_patch && answer.distance > part_.far_from(stride)) {
-      if (const Start other = start_named(p, stride); std::isfinite(other.square)) {
+    if (answer.bounds_patch && answer.distance > part_.far_from(stride)) {
+      // Outer points, of which there are many, ask one box only.
+      const Start other =
+          answer.inside ? start_named(p, stride) : start_away(p, answer.row, answer.col, stride);
+      if (std::isfinite(other.square)) {
         refined.row = other.row;
         refined.col = other.col;
         third_layer(p, stride, refined);
-        if (refined.distance < answer.distance) answer = refined;
+        if (refined.distance < kNearer * answer.distance) answer = refined;
       }
     }
   } else if (answer.inside && !std::isfinite(answer.distance)) {
@@ -347,8 +355,8 @@ inline ChartAnswer Chart::second_layer(const Vec3f& p, const Foot<float>& foot,
   if (cell.code[nearest] != part_.miss_code()) {
     pass(depth[nearest] + shift, true);
     const std::uint32_t texel = cell.texel[nearest];
-    for (std::uint32_t k = resident_.find(part_.sheets, texel);
-         k < part_.sheets.count && resident_.key(part_.sheets, k) == texel; ++k) {
+    for (std::uint32_t k = resident_.find(part_, part_.sheets, texel);
+         k < part_.sheets.count && resident_.key(part_, part_.sheets, k) == texel; ++k) {
       pass(part_.depth_of(resident_.sheet_code(part_, k)) + shift, false);
     }
   }

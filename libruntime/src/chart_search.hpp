@@ -59,6 +59,16 @@ inline Chart::Start Chart::start_named(const Vec3f& p, std::uint32_t stride) con
   return best;
 }
 
+inline Chart::Start Chart::start_away(const Vec3f& p, float row, float col,
+                                      std::uint32_t stride) const noexcept {
+  const std::uint16_t name = resident_.start(part_, part_.bend.straightened(p), StartTable::kOwn);
+  const float named_row = part_.starts.place(name >> 8U), named_col = part_.starts.place(name & 255U);
+  const float across = std::abs(col - named_col), reach = part_.starts.reach();
+  const bool is_near =
+      std::abs(row - named_row) <= reach && lesser(across, static_cast<float>(part_.cols) - across) <= reach;
+  return is_near || name == StartTable::kNone ? Start{} : start_at(p, named_row, named_col, stride);
+}
+
 inline Chart::Step Chart::step_towards(const Patch& patch, const Vec3f& error,
                                        std::uint32_t stride) const noexcept {
   const float a = dot(patch.row, patch.row), b = dot(patch.row, patch.col), c = dot(patch.col, patch.col);
@@ -154,8 +164,9 @@ inline void Chart::third_layer(const Vec3f& p, std::uint32_t stride, ChartAnswer
 }
 
 inline bool Chart::vertex_fan(const Vec3f& p, const Cell& cell, ChartAnswer& answer) const noexcept {
-  const std::uint32_t position = resident_.find(part_.fans, cell.texel[0]);
-  if (position >= part_.fans.count || resident_.key(part_.fans, position) != cell.texel[0]) return false;
+  const std::uint32_t position = resident_.find(part_, part_.fans, cell.texel[0]);
+  if (position >= part_.fans.count || resident_.key(part_, part_.fans, position) != cell.texel[0])
+    return false;
   const std::uint32_t where = resident_.fan_place(part_, position);
   const auto low = static_cast<float>(cell.row), left = static_cast<float>(cell.col);
   const float top = low + 1.0F, right = left + 1.0F;

@@ -68,7 +68,7 @@ class Looker {
     const auto along = [&](V coordinate, int axis) HWY_ATTR {
       const auto count = static_cast<float>(starts.boxes[axis]);
       const V place = (coordinate * all(part_.inverse_extents[axis]) + all(1.0F)) * all(0.5F * count) +
-                      all((k >> axis & 1) == 0 ? -0.5F : 0.5F);
+                      all(StartTable::shift(k, axis));
       return to_int(limited(place, hn::Zero(kD), all(count - 1.0F)));
     };
     const VI slice = along(p.z, 2) * all_int(starts.boxes[1]) + along(p.y, 1);
@@ -80,14 +80,21 @@ class Looker {
   HWY_INLINE V start_row(VI start) const noexcept { return start_place(hn::ShiftRight<8>(start)); }
   HWY_INLINE V start_col(VI start) const noexcept { return start_place(hn::And(start, all_int(255))); }
 
+  /// Whether Chart::start_away stays.
+  HWY_INLINE M is_named(const V3& straight, V row, V col) const noexcept {
+    const VI name = start_of(straight, StartTable::kOwn);
+    const V reach = all(part_.starts.reach()), across = hn::Abs(col - start_col(name));
+    const M near_row = hn::Le(hn::Abs(row - start_row(name)), reach);
+    return hn::And(near_row, hn::Le(least(across, all(turn_) - across), reach));
+  }
+
   // What Walker builds on.
 
   HWY_INLINE VCell cell_of(VI row, VI col) const noexcept {
     VCell cell;
     cell.row = row;
     cell.col = col;
-    const VI right = col + all_int(stride_);
-    const VI next = hn::IfThenElseZero(hn::Lt(right, all_int(part_.cols)), right);
+    const VI next = next_col(col);
     const VI low = row * all_int(part_.cols), up = all_int(stride_ * part_.cols);
     cell.texel[0] = low + col;
     cell.texel[1] = low + next;
@@ -109,26 +116,30 @@ class Looker {
   HWY_INLINE V depth_of(VI code) const noexcept {
     return all(part_.depth_min) + to_float(code) * all(part_.depth_step);
   }
-  /// Reads the corners' texels; sets their depths.
+  /// Reads the texels of the corners of (cell.row, cell.col); sets their depths.
   SQMAP_KERNEL Corners read(VCell& cell) const noexcept {
     const std::uint8_t* base = resident_.bytes() + part_.texels_at;
     const VU mask = hn::Set(kDU, (1U << part_.texel_bits) - 1U);
-    const auto word_at = [&](VI texel) HWY_ATTR {
-      const VI bit = texel * all_int(part_.texel_bits);
+    const auto word_at = [&](VI place) HWY_ATTR {
+      const VI bit = place * all_int(part_.texel_bits);
       return gather_bytes(base, hn::ShiftRight<3>(bit)) >> hn::And(hn::BitCast(kDU, bit), hn::Set(kDU, 7U));
     };
+    const auto texel_of = [&](VU word) HWY_ATTR { return hn::BitCast(kDI, hn::And(word, mask)); };
     Corners corners;
-    // Two neighbours fit one word where no lane's cell lies across the seam of the columns.
-    const M torn = as_float(hn::Ne(cell.texel[1], cell.texel[0] + all_int(1)));
-    if (part_.texel_bits <= 12 && none(torn)) {
-      for (int k = 0; k < 4; k += 2) {
-        const VU both = word_at(cell.texel[k]);
-        corners.texel[k] = hn::BitCast(kDI, hn::And(both, mask));
-        const VU second = both >> hn::Set(kDU, part_.texel_bits);
-        corners.texel[k + 1] = hn::BitCast(kDI, hn::And(second, mask));
-      }
-    } else {
-      for (int k = 0; k < 4; ++k) corners.texel[k] = hn::BitCast(kDI, hn::And(word_at(cell.texel[k]), mask));
+    VI row_word[4];  // of the lower row and its next, of the upper row and its next
+    row_words(cell.row, row_word);
+    for (int k = 0; k < 4; k += 2) {
+      const VRow row = row_of(row_word[k], row_word[k + 1]);
+      // Resident::texel. The next column is the next of those held, or neither is.
+      const VI left = place_of(cell.col, row.first);
+      const VI right = stride_ == 1 ? left + all_int(1) : place_of(next_col(cell.col), row.first);
+      const VU left_word = word_at(row.at + hn::Min(left, row.count));
+      // Two neighbours fit one word.
+      const VU right_word = stride_ == 1 && part_.texel_bits <= 12
+                                ? left_word >> hn::Set(kDU, part_.texel_bits)
+                                : word_at(row.at + hn::Min(right, row.count));
+      corners.texel[k] = hn::IfThenElse(hn::Lt(left, row.count), texel_of(left_word), row.others);
+      corners.texel[k + 1] = hn::IfThenElse(hn::Lt(right, row.count), texel_of(right_word), row.others);
     }
     const VI miss = all_int(part_.miss_code());
     const VI highest =
@@ -174,6 +185,42 @@ class Looker {
   float turn() const noexcept { return turn_; }
 
  private:
+  struct VRow {
+    VI at, first, count;  // MapRow
+    VI others;            // the texels that are not held
+  };
+  HWY_INLINE VI next_col(VI col) const noexcept {
+    const VI right = col + all_int(stride_);
+    return hn::IfThenElseZero(hn::Lt(right, all_int(part_.cols)), right);
+  }
+  HWY_INLINE void row_words(VI row, VI (&words)[4]) const noexcept {
+    const std::uint8_t* base = resident_.bytes() + part_.texels_at - part_.row_bytes();
+    const auto word_at = [&](VI r)
+                             HWY_ATTR { return hn::BitCast(kDI, gather_bytes(base, hn::ShiftLeft<2>(r))); };
+    const VI one = all_int(1), above = row + all_int(stride_);
+    words[0] = word_at(row);
+    words[1] = word_at(row + one);
+    words[2] = stride_ == 1 ? words[1] : word_at(above);
+    words[3] = word_at(above + one);
+  }
+  /// Resident::row.
+  HWY_INLINE VRow row_of(VI word, VI next) const noexcept {
+    const int bits = static_cast<int>(part_.row_place_bits());
+    const VI mask = all_int((1U << part_.row_place_bits()) - 1U);
+    VI at = hn::And(word, mask), end = hn::And(next, mask);
+    if (part_.row_shift != 0) [[unlikely]] {
+      at = hn::ShiftLeftSame(at, part_.row_shift);
+      end = hn::ShiftLeftSame(end, part_.row_shift);
+    }
+    const VU inside = hn::ShiftRightSame(hn::BitCast(kDU, word), bits - part_.code_bits);
+    const VU start = hn::And(inside, hn::Set(kDU, 1U << part_.code_bits));
+    return {at, hn::BitCast(kDI, hn::ShiftRightSame(hn::BitCast(kDU, word), bits + 1)), end - at,
+            hn::BitCast(kDI, hn::Or(start, hn::Set(kDU, part_.miss_code())))};
+  }
+  HWY_INLINE VI place_of(VI col, VI first) const noexcept {
+    const VU place = hn::BitCast(kDU, col - first);  // below 0: beyond all others
+    return hn::BitCast(kDI, hn::Min(place, place + hn::Set(kDU, std::uint32_t{part_.cols})));
+  }
   HWY_NOINLINE void bend(VPatch& patch) const noexcept {
     const VTurn turn = turn_at(part_.bend, patch.point);
     patch.point = bent_point(part_.bend, turn, patch.point);
@@ -323,8 +370,8 @@ HWY_NOINLINE void Looker::further_sheets(M lanes, VI texel, V shift, V depth, V&
     if (!(wanted[lane] > 0)) continue;
     bool odd = true;
     const auto key = static_cast<std::uint32_t>(texels[lane]);
-    for (std::uint32_t k = resident_.find(part_.sheets, key);
-         k < part_.sheets.count && resident_.key(part_.sheets, k) == key; ++k, odd = !odd) {
+    for (std::uint32_t k = resident_.find(part_, part_.sheets, key);
+         k < part_.sheets.count && resident_.key(part_, part_.sheets, k) == key; ++k, odd = !odd) {
       const float here = part_.depth_of(resident_.sheet_code(part_, k)) + shifts[lane];
       if (here < depths[lane]) insides[lane] = 1.0F - insides[lane];
       if (!(std::abs(here - depths[lane]) < gaps[lane])) continue;

@@ -7,6 +7,8 @@
 #include <type_traits>
 #include <vector>
 
+#include "sqmap/asset/miss_run.hpp"
+
 namespace sqmap::runtime {
 
 namespace {
@@ -55,6 +57,8 @@ class BitPacker {
   unsigned count_ = 0;
 };
 
+constexpr std::size_t kNarrowTexels = 65536;  // more have wide keys
+
 template <class Entry, class Key, class Value>
 SideList put_list(Layout& out, std::vector<Entry> entries, std::size_t texels, Key key, Value value) {
   // The quick validation does not look at the entries; what names no texel can never be asked for.
@@ -71,10 +75,58 @@ SideList put_list(Layout& out, std::vector<Entry> entries, std::size_t texels, K
   list.blocks_at = out.at();
   out.put(blocks.data(), blocks.size());
   list.keys_at = out.at();
-  for (const Entry& entry : entries) out.put<std::uint32_t>(key(entry));
+  for (const Entry& entry : entries) {
+    if (texels > kNarrowTexels) {
+      out.put<std::uint32_t>(key(entry));
+    } else {
+      out.put(static_cast<std::uint16_t>(key(entry)));
+    }
+  }
   list.values_at = out.at();
   for (const Entry& entry : entries) value(entry);
   return list;
+}
+
+/// What is held of the rows of a map: MapRow with `at` unknown.
+std::vector<MapRow> rows_of(const DistanceMap& map) {
+  std::vector<MapRow> rows(map.rows);
+  for (std::uint32_t row = 0; row < map.rows; ++row) {
+    const MissRun run = longest_miss_run(map, row);
+    rows[row] = run.count < 2 ? MapRow{0, 0, map.cols + 1, false}
+                              : MapRow{0, (run.end + map.cols - 1) % map.cols, map.cols - run.count + 1,
+                                       run.kind == RayKind::kInnerMiss};
+  }
+  return rows;
+}
+
+/// The rows of a map and its texels.
+void put_texels(Layout& out, const DistanceMap& map, const std::vector<MapRow>& rows, PartRecord& record) {
+  const std::uint32_t place_bits = record.row_place_bits();
+  const auto units_of = [&](const MapRow& row) {
+    return (row.count + (1U << record.row_shift) - 1) >> record.row_shift;
+  };
+  const auto units = [&] {
+    std::uint64_t sum = 0;
+    for (const MapRow& row : rows) sum += units_of(row);
+    return sum;
+  };
+  while (units() >> place_bits != 0) ++record.row_shift;
+  std::uint32_t at = 0;
+  for (const MapRow& row : rows) {
+    out.put(at | ((row.first << 1U) | (row.inside ? 1U : 0U)) << place_bits);
+    at += units_of(row);
+  }
+  out.put(at);
+  record.texels_at = out.at();
+  BitPacker packer(out);
+  for (std::uint32_t row = 0; row < map.rows; ++row) {
+    for (std::uint32_t k = 0; k < units_of(rows[row]) << record.row_shift; ++k) {
+      const std::uint32_t texel = row * map.cols + (rows[row].first + k) % map.cols;
+      packer.put((map.code[texel] & map.miss_code()) | (map.starts_inside(texel) ? 1U << map.bits : 0U),
+                 record.texel_bits);
+    }
+  }
+  packer.flush();
 }
 
 constexpr double kMostPacked = 65535;
@@ -129,14 +181,17 @@ StoredCurve pack(const CurveTable<double>& curve) {
   return {result, units};
 }
 
-/// The curves of a part, which cost more than all else that is laid out.
-struct Curves {
-  explicit Curves(const Superquadric& shape)
-      : eta(meridian(shape, shape.taper)),
-        omega(pack(CurveTable<double>::of(shape.semi_axes_m.x, shape.semi_axes_m.y, shape.e2))) {
-    if (shape.taper != 0) eta_below = meridian(shape, -shape.taper);
+/// What is laid out of a part that takes most time to find.
+struct Prepared {
+  explicit Prepared(const Part& part)
+      : eta(meridian(part.shape, part.shape.taper)),
+        omega(
+            pack(CurveTable<double>::of(part.shape.semi_axes_m.x, part.shape.semi_axes_m.y, part.shape.e2))),
+        rows(rows_of(part.map)) {
+    if (part.shape.taper != 0) eta_below = meridian(part.shape, -part.shape.taper);
   }
   StoredCurve eta, omega, eta_below{};
+  std::vector<MapRow> rows;
 
  private:
   static StoredCurve meridian(const Superquadric& shape, double taper) {
@@ -188,7 +243,7 @@ BoundingSphere seen_from(const Vec3f& origin_m, const BoundingSphere& sphere) {
   return {sphere.centre_m - cast<double>(origin_m), sphere.radius_m};
 }
 
-PartRecord put_part(Layout& out, const Part& part, const Curves& curves, const Vec3f& origin_m,
+PartRecord put_part(Layout& out, const Part& part, const Prepared& prepared, const Vec3f& origin_m,
                     double units_per_m) {
   // Not the stored sphere: readers do not check that it holds the superquadric, and points would then be
   // dropped with one block and kept with another.
@@ -212,8 +267,9 @@ PartRecord put_part(Layout& out, const Part& part, const Curves& curves, const V
   record.sphere_square = square_of_ball(sphere, units_per_m);
   record.depth_min = static_cast<float>(units_per_m * map.depth_min_m);
   record.depth_step = static_cast<float>(units_per_m * map.depth_step_m);
-  record.rows = map.rows;
-  record.cols = map.cols;
+  record.rows = static_cast<std::uint16_t>(map.rows);
+  record.cols = static_cast<std::uint16_t>(map.cols);
+  record.wide_keys = map.code.size() > kNarrowTexels;
   record.vertex_count = part.vertex_count;
   record.level_count = static_cast<std::uint8_t>(map.level_count);
   record.code_bits = static_cast<std::uint8_t>(map.bits);
@@ -221,12 +277,12 @@ PartRecord put_part(Layout& out, const Part& part, const Curves& curves, const V
                                     [](std::uint8_t bits) { return bits != 0; });
   record.texel_bits = static_cast<std::uint8_t>(map.bits + (has_seam ? 1 : 0));
 
-  if (record.taper != 0) out.put(curves.eta_below);
+  if (record.taper != 0) out.put(prepared.eta_below);
   record.curves_at = out.at();
-  out.put(curves.eta.packed);
-  out.put(curves.omega.packed);
-  record.eta_units = curves.eta.units;
-  record.omega_units = curves.omega.units;
+  out.put(prepared.eta.packed);
+  out.put(prepared.omega.packed);
+  record.eta_units = prepared.eta.units;
+  record.omega_units = prepared.omega.units;
 
   record.bound_cells = static_cast<std::uint8_t>(part.bounds.cells);
   out.put(part.bounds.cell.data(), part.bounds.cell.size() * sizeof(BoundCell));
@@ -236,13 +292,7 @@ PartRecord put_part(Layout& out, const Part& part, const Curves& curves, const V
   const std::vector<std::uint8_t> no_starts(record.starts.bytes(), 0xFF);
   out.put(no_starts.data(), no_starts.size());
 
-  record.texels_at = out.at();
-  BitPacker packer(out);
-  for (std::uint32_t k = 0; k < map.code.size(); ++k) {
-    packer.put((map.code[k] & map.miss_code()) | (map.starts_inside(k) ? 1U << map.bits : 0U),
-               record.texel_bits);
-  }
-  packer.flush();
+  put_texels(out, map, prepared.rows, record);
 
   record.sheets = put_list(
       out, map.crossings, map.code.size(), [](const DistanceMap::Crossing& c) { return c.texel; },
@@ -308,12 +358,12 @@ Resident::Resident(const Asset& asset) : part_count_(static_cast<std::uint32_t>(
   sphere_radius_ = rounded_up(units_per_m * sphere.radius_m);
   sphere_square_ = square_of_ball(sphere, units_per_m);
   const std::vector<PartRecord> blank(part_count_);
-  std::vector<Curves> curves;
-  for (const Part& part : asset.parts) curves.emplace_back(part.shape);
+  std::vector<Prepared> prepared;
+  for (const Part& part : asset.parts) prepared.emplace_back(part);
   const auto lay_out = [&](Layout& out) {
     out.put(blank.data(), blank.size() * sizeof(PartRecord));
     for (std::uint32_t k = 0; k < part_count_; ++k) {
-      const PartRecord record = put_part(out, asset.parts[k], curves[k], origin_m_, units_per_m);
+      const PartRecord record = put_part(out, asset.parts[k], prepared[k], origin_m_, units_per_m);
       if (bytes_) std::memcpy(bytes_.get() + k * sizeof(PartRecord), &record, sizeof record);
     }
     out.put(std::uint32_t{0});
@@ -329,14 +379,15 @@ Resident::Resident(const Asset& asset) : part_count_(static_cast<std::uint32_t>(
   for (std::uint32_t k = 0; k < part_count_; ++k) fill_starts(part(k));
 }
 
-std::uint32_t Resident::find(const SideList& list, std::uint32_t key_wanted) const noexcept {
+std::uint32_t Resident::find(const PartRecord& part, const SideList& list,
+                             std::uint32_t key_wanted) const noexcept {
   if (list.count == 0) return 0;
   const std::uint32_t block = key_wanted / kBlock;
   if (((bytes_[list.blocks_at + block / 8] >> (block % 8)) & 1U) == 0) return list.count;
   std::uint32_t low = 0, high = list.count;
   while (low < high) {
     const std::uint32_t middle = low + (high - low) / 2;
-    if (key(list, middle) < key_wanted) {
+    if (key(part, list, middle) < key_wanted) {
       low = middle + 1;
     } else {
       high = middle;

@@ -4,8 +4,8 @@
 // object's radius: products of four lengths then neither overflow nor vanish, and changing units rounds
 // nothing. One allocation of
 //
-//     PartRecord[parts] | part 0: curves | bounds | starts | texels | sheet blocks | sheets | fan blocks |
-//     fans | part 1: ... | 4 bytes
+//     PartRecord[parts] | part 0: curves | bounds | starts | rows | texels | sheet blocks | sheets |
+//     fan blocks | fans | part 1: ... | 4 bytes
 //
 //     curves   eta and omega as CurveTable, 16 bits a number: how far c falls and s rises over each cell
 //     (their sums
@@ -13,15 +13,21 @@
 //              hardly more), and the steps at the nodes
 //     bounds   BoundCell[6 bound_cells^2], where the asset has bounds
 //     starts   StartTable: where layer 3 may begin, 16 bits a box
-//     texels   one a node, row-major, `texel_bits` each, least significant bit first: the depth code and,
-//     where
-//              the part has a seam, above it the bit that the node starts inside the mesh
-//     sheets   second and later crossings: texel numbers of 32 bits, ascending, then codes of 16 bits
-//     fans     vertex samples: cells of 32 bits, ascending, then places (row, col of 8 bits), then codes
+//     rows     MapRow as 32 bits a row of the map and one more for their end: the place of its first texel,
+//              the column of that, and whether the others start inside
+//     texels   `texel_bits` each, least significant bit first: the depth code and, where the part has a seam,
+//              above it the bit that the node starts inside the mesh. Of each row, round the turn, without
+//              all but the last of the longest run of nodes whose rays hit nothing and start alike; a row
+//              that has no such two begins at column 0 and ends with that again. So the right neighbour of
+//              a node that is held follows it, and that of another is not held, or is alike
+//     sheets   second and later crossings: texel numbers, ascending, of 16 bits where the map has no more
+//              than 65536 texels and of 32 in others, then codes of 16 bits
+//     fans     vertex samples: cells, likewise, then places (row, col of 8 bits), then codes
 //     blocks   one bit for each kBlock texels: a list holds one of them. Absent where the list is empty.
 #pragma once
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -69,7 +75,8 @@ struct Slabs {
 /// side. Filled by fill_starts() from the maps; not part of the asset.
 struct StartTable {
   static constexpr std::uint32_t kMostBoxes = 256;
-  static constexpr int kAround = 8;
+  static constexpr int kAround = 8, kOwn = 8;
+  static constexpr float kReachSteps = 1.0F;
   static constexpr std::uint16_t kNone = 0xFFFF;  ///< the part has no patch
 
   std::uint32_t at{};         ///< byte offset
@@ -77,12 +84,26 @@ struct StartTable {
   std::uint8_t step_shift{};  ///< log2 of the coarser grid's spacing [cells]
 
   static StartTable of(std::uint32_t rows, std::uint32_t cols, const Vec3f& half_extents) noexcept;
+  /// Cells: places so near to one that is named are as good, for what a box knows.
+  float reach() const noexcept { return kReachSteps * static_cast<float>(1U << step_shift); }
+  /// From a point to one in the k-th of the boxes around it, in boxes; kOwn: in that it lies in.
+  static constexpr float shift(int k, int axis) noexcept {
+    return k == kOwn ? 0.0F : (k >> axis & 1) == 0 ? -0.5F : 0.5F;
+  }
   std::size_t bytes() const noexcept { return std::size_t{2} * boxes[0] * boxes[1] * boxes[2]; }
   /// Of a row or column of the coarser grid: that of the middle of its cell in the map.
   float place(std::uint32_t k) const noexcept {
     const std::uint32_t cell = (k << step_shift) + (1U << step_shift) / 2;
     return static_cast<float>(cell) + 0.5F;
   }
+};
+
+/// What is held of one row of a map.
+struct MapRow {
+  std::uint32_t at{};     ///< number of its first texel among those held
+  std::uint32_t first{};  ///< column of that
+  std::uint32_t count{};  ///< texels held; the others are misses
+  bool inside{};          ///< whether those start inside
 };
 
 /// One part. Lengths in units of Resident::unit_m; byte offsets count from the start of the allocation.
@@ -99,9 +120,12 @@ struct PartRecord {
   float sphere_radius{}, sphere_square{};  ///< the square is that of a slightly larger ball
   float depth_min{}, depth_step{};
   CurveUnits eta_units, omega_units;
-  std::uint32_t rows{}, cols{}, vertex_count{};
+  std::uint32_t vertex_count{};
+  std::uint16_t rows{}, cols{};
   std::uint8_t level_count{}, code_bits{}, texel_bits{};
   std::uint8_t bound_cells{};  ///< a side of a face; 0: no bounds
+  std::uint8_t row_shift{};    ///< rows begin at multiples of 2^row_shift texels
+  bool wide_keys{};            ///< of the side lists: 32 bits, not 16
   std::uint32_t curves_at{}, texels_at{};
   StartTable starts;
   SideList sheets, fans;
@@ -121,6 +145,12 @@ struct PartRecord {
   float depth_of(std::uint32_t code) const noexcept {
     return depth_min + static_cast<float>(code) * depth_step;
   }
+  /// Bytes before texels_at where the rows begin.
+  std::uint32_t row_bytes() const noexcept { return 4U * (rows + 1U); }
+  /// Of the word of a row: those of MapRow::at >> row_shift; above them that of `inside` and then `first`.
+  std::uint32_t row_place_bits() const noexcept {
+    return 31U - static_cast<std::uint32_t>(std::bit_width(cols - 1U));
+  }
   std::uint32_t stride_at(std::uint32_t level) const noexcept {
     return 1U << (level < level_count ? level : level_count - 1U);
   }
@@ -133,7 +163,7 @@ struct PartRecord {
   float blur(std::uint32_t stride) const noexcept { return 0.05F * far_from(stride); }
   double texels_at_level(std::uint32_t level) const noexcept {
     const std::uint32_t stride = stride_at(level);
-    const std::uint32_t row_steps = (rows - 1) / stride, col_steps = cols / stride;
+    const std::uint32_t row_steps = (rows - 1U) / stride, col_steps = cols / stride;
     return (static_cast<double>(row_steps) + 1) * static_cast<double>(col_steps);
   }
 };
@@ -166,9 +196,19 @@ class Resident {
   const std::uint8_t* bytes() const noexcept { return bytes_.get(); }
   std::size_t size() const noexcept { return size_; }
 
-  /// The depth code and start bit of a texel.
-  std::uint32_t texel(const PartRecord& part, std::uint32_t index) const noexcept {
-    const std::uint32_t bit = index * part.texel_bits;
+  /// Precondition: index < part.rows.
+  MapRow row(const PartRecord& part, std::uint32_t index) const noexcept {
+    const std::uint32_t at = part.texels_at - part.row_bytes() + 4 * index;
+    const auto word = load<std::uint32_t>(at), next = load<std::uint32_t>(at + 4);
+    const std::uint32_t bits = part.row_place_bits(), mask = (1U << bits) - 1U;
+    return {(word & mask) << part.row_shift, word >> (bits + 1U),
+            ((next & mask) - (word & mask)) << part.row_shift, (word >> bits & 1U) != 0};
+  }
+  /// The depth code and start bit of the texel in a row of the part's map. Precondition: col < part.cols.
+  std::uint32_t texel(const PartRecord& part, const MapRow& row, std::uint32_t col) const noexcept {
+    const std::uint32_t place = col < row.first ? col + part.cols - row.first : col - row.first;
+    if (place >= row.count) return part.miss_code() | (row.inside ? 1U << part.code_bits : 0U);
+    const std::uint32_t bit = (row.at + place) * part.texel_bits;
     return (load<std::uint32_t>(part.texels_at + bit / 8) >> (bit % 8)) & ((1U << part.texel_bits) - 1U);
   }
   /// Precondition: cell < 6 part.bound_cells^2.
@@ -176,23 +216,25 @@ class Resident {
     return load<BoundCell>(part.curves_at + kCurveBytes +
                            cell * static_cast<std::uint32_t>(sizeof(BoundCell)));
   }
-  /// StartTable: what the k-th of the boxes around p, straight frame, names, or kNone.
+  /// StartTable: what the k-th of the boxes around p, straight frame, names, or kNone. k = kOwn: the one p is
+  /// in.
   std::uint16_t start(const PartRecord& part, const Vec3f& p, int k) const noexcept {
     const StartTable& starts = part.starts;
     std::uint32_t box = 0;
     for (int axis = 2; axis >= 0; --axis) {
       const auto count = static_cast<float>(starts.boxes[axis]);
-      const float place = (p[axis] * part.inverse_extents[axis] + 1.0F) * (0.5F * count) +
-                          ((k >> axis & 1) == 0 ? -0.5F : 0.5F);
+      const float place =
+          (p[axis] * part.inverse_extents[axis] + 1.0F) * (0.5F * count) + StartTable::shift(k, axis);
       box = box * starts.boxes[axis] + static_cast<std::uint32_t>(lesser(greater(place, 0.0F), count - 1.0F));
     }
     return load<std::uint16_t>(starts.at + 2 * box);
   }
   /// Position of the first entry of a list with key >= `key`, or `count`, without a search where its block is
   /// empty.
-  std::uint32_t find(const SideList& list, std::uint32_t key) const noexcept;
-  std::uint32_t key(const SideList& list, std::uint32_t position) const noexcept {
-    return load<std::uint32_t>(list.keys_at + 4 * position);
+  std::uint32_t find(const PartRecord& part, const SideList& list, std::uint32_t key) const noexcept;
+  std::uint32_t key(const PartRecord& part, const SideList& list, std::uint32_t position) const noexcept {
+    return part.wide_keys ? load<std::uint32_t>(list.keys_at + 4 * position)
+                          : load<std::uint16_t>(list.keys_at + 2 * position);
   }
   std::uint16_t sheet_code(const PartRecord& part, std::uint32_t position) const noexcept {
     return load<std::uint16_t>(part.sheets.values_at + 2 * position);

@@ -65,12 +65,12 @@ class Walker {
     set_out_strays(aside);
     go_on();
     if (fans_.count > 0) fans();
-    set_out_again(begin, end, aside);
+    set_out_again(begin, end, kAgain, aside);
   }
   /// Finds, for layer 2, the surface near inner points above which it knows none: Chart::look.
   HWY_NOINLINE void find_lost(std::uint32_t begin, std::uint32_t end) noexcept {
     EntryList lost;
-    set_out_again(begin, end, lost);
+    set_out_again(begin, end, kAgain | kInside, lost);
   }
 
  private:
@@ -90,7 +90,8 @@ class Walker {
   HWY_NOINLINE V find_named(const V3& p, M lanes, V& row, V& col) const noexcept;
   HWY_NOINLINE void set_out(std::uint32_t i, M wanted, EntryList& strays) noexcept;
   HWY_NOINLINE void set_out_strays(const EntryList& strays) noexcept;
-  HWY_NOINLINE void set_out_again(std::uint32_t begin, std::uint32_t end, EntryList& remote) noexcept;
+  HWY_NOINLINE void set_out_again(std::uint32_t begin, std::uint32_t end, std::int32_t needed,
+                                  EntryList& remote) noexcept;
   SQMAP_KERNEL void go(Walk& walk, VCell& cell, VI entry, M lanes) noexcept;
   HWY_NOINLINE void go_on() noexcept;
   HWY_NOINLINE void keep(Walk& walk, VI entry, M lanes) noexcept;
@@ -106,7 +107,7 @@ class Walker {
   Entries& entries_;
   Pending pending_;
   Fans fans_;
-  bool must_be_nearer_ = false;             ///< what is written must be nearer than what is known
+  bool must_be_nearer_ = false;             ///< by kNearer than what is known
   std::uint32_t first_in_a_row_ = kNobody;  ///< what is written are entries in a row from here; kNobody: not
 };
 
@@ -335,7 +336,7 @@ HWY_NOINLINE void Walker::set_out(std::uint32_t i, M wanted, EntryList& strays) 
   const M at_foot = hn::And(wanted, has(kPatch)), inside = hn::And(wanted, has(kInside));
   strays.append(entry, hn::AndNot(at_foot, inside));
   if (none(at_foot)) return;
-  const VI again = pick(hn::And(at_foot, inside), all_int(kAgain), hn::Zero(kDI));
+  const VI again = pick(at_foot, all_int(kAgain), hn::Zero(kDI));
   hn::StoreU(hn::Or(flags, again), kDI, entries_.flags + i);
   const V row = hn::LoadU(kD, entries_.foot_row + i), col = hn::LoadU(kD, entries_.foot_col + i);
   VCell cell;
@@ -370,15 +371,23 @@ HWY_NOINLINE void Walker::set_out_strays(const EntryList& strays) noexcept {
   }
 }
 
-/// From where the table of starts says, for points that are far from the surface that was found.
-HWY_NOINLINE void Walker::set_out_again(std::uint32_t begin, std::uint32_t end, EntryList& remote) noexcept {
+/// From where the table of starts says, for points with the flags `needed` that are far from the surface that
+/// was found; outer ones from what their own box names, unless that is where they are.
+HWY_NOINLINE void Walker::set_out_again(std::uint32_t begin, std::uint32_t end, std::int32_t needed,
+                                        EntryList& remote) noexcept {
   const V far = all(part_.far_from(looker_.stride()));
   remote.count = 0;
   for (std::uint32_t i = begin; i < end; i += lane_count()) {
-    constexpr std::int32_t kBoth = kAgain | kInside;
-    const VI flags = hn::And(hn::LoadU(kDI, entries_.flags + i), all_int(kBoth));
-    M is_far = hn::And(as_float(hn::Eq(flags, all_int(kBoth))), hn::FirstN(kD, end - i));
+    const VI flags = hn::LoadU(kDI, entries_.flags + i);
+    M is_far = as_float(hn::Eq(hn::And(flags, hn::Set(kDI, needed)), hn::Set(kDI, needed)));
+    is_far = hn::And(is_far, hn::FirstN(kD, end - i));
     is_far = hn::And(is_far, hn::Gt(hn::LoadU(kD, entries_.distance + i), far));
+    if (none(is_far)) continue;
+    const V3 straight = straightened(part_.bend, load3(entries_.x, entries_.y, entries_.z, i));
+    const M named =
+        looker_.is_named(straight, hn::LoadU(kD, entries_.row + i), hn::LoadU(kD, entries_.col + i));
+    const M outer = as_float(hn::Eq(hn::And(flags, all_int(kInside)), hn::Zero(kDI)));
+    is_far = hn::AndNot(hn::And(named, outer), is_far);
     remote.append(hn::Iota(kDI, static_cast<std::int32_t>(i)), is_far);
   }
   if (remote.count == 0) return;
@@ -389,9 +398,21 @@ HWY_NOINLINE void Walker::set_out_again(std::uint32_t begin, std::uint32_t end, 
     const auto field = [&](const float* values)
                            HWY_ATTR { return hn::IfThenElseZero(lanes, hn::GatherIndex(kD, values, entry)); };
     const V3 p{field(entries_.x), field(entries_.y), field(entries_.z)};
-    V row, col;
-    const M found =
-        hn::And(lanes, hn::Lt(find_named(p, lanes, row, col), all(std::numeric_limits<float>::infinity())));
+    const VI flags = hn::GatherIndex(kDI, entries_.flags, entry);
+    const M outer = hn::And(lanes, as_float(hn::Eq(hn::And(flags, all_int(kInside)), hn::Zero(kDI))));
+    const M inner = hn::AndNot(outer, lanes);
+    V row = hn::Zero(kD), col = row;
+    M found = outer;
+    if (!none(inner)) {
+      const M near = hn::Lt(find_named(p, inner, row, col), all(std::numeric_limits<float>::infinity()));
+      found = hn::Or(outer, hn::And(inner, near));
+    }
+    if (!none(outer)) {
+      const VI name = looker_.start_of(straightened(part_.bend, p), StartTable::kOwn);
+      row = pick(outer, looker_.start_row(name), row);
+      col = pick(outer, looker_.start_col(name), col);
+      found = hn::AndNot(hn::And(outer, as_float(hn::Eq(name, all_int(StartTable::kNone)))), found);
+    }
     VCell cell;
     M eligible;
     Walk walk = this->begin(p, row, col, cell, eligible);
@@ -434,7 +455,7 @@ SQMAP_KERNEL void Walker::write(VI entry, M lanes, V row, V col, V on_rim, V dis
   M has_rival = as_float(hn::Ne(hn::And(flags, all_int(kPoint)), hn::Zero(kDI)));
   if (must_be_nearer_) has_rival = lanes;
   if (!none(hn::And(lanes, has_rival))) {
-    const V known = hn::GatherIndex(kD, entries_.distance, at);
+    const V known = all(must_be_nearer_ ? kNearer : 1.0F) * hn::GatherIndex(kD, entries_.distance, at);
     lanes = hn::AndNot(hn::AndNot(hn::Lt(distance, known), has_rival), lanes);
   }
   const VI faces = pick(hn::Gt(on_rim, hn::Zero(kD)), hn::Zero(kDI), all_int(kFaces));

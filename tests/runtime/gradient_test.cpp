@@ -68,10 +68,10 @@ std::string source_of(std::uint32_t k, const Vec3f& p, const ChartAnswer& here, 
   if (std::abs(here.row - start.row) > 6 ||
       (std::min(off_cols, cols - off_cols) > 6 && here.row > 4 && here.row < rows - 5))
     branches.take("far from the foot");
-  const std::uint32_t cell = std::min(static_cast<std::uint32_t>(here.row), part.rows - 2) * part.cols +
-                             std::min(static_cast<std::uint32_t>(here.col), part.cols - 1);
-  const std::uint32_t at = resident.find(part.fans, cell);
-  if (at < part.fans.count && resident.key(part.fans, at) == cell) return "vertex fan";
+  const std::uint32_t cell = std::min(static_cast<std::uint32_t>(here.row), part.rows - 2U) * part.cols +
+                             std::min(static_cast<std::uint32_t>(here.col), part.cols - 1U);
+  const std::uint32_t at = resident.find(part, part.fans, cell);
+  if (at < part.fans.count && resident.key(part, part.fans, at) == cell) return "vertex fan";
   return here.faces_patch ? "patch" : "rim";
 }
 
