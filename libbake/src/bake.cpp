@@ -36,29 +36,33 @@ constexpr std::uint64_t kMeasureSeed = 1000;
 // to this share of R_max first, as far as the number of added triangles allows.
 constexpr double kLongestEdge = 1.0 / 16;
 constexpr std::size_t kMostAddedFaces = 20000;
+// What the time is worth that one more part takes at run time.
+constexpr double kPartTimeBytes = 1000;
 
 // The runtime and the tree of closest points square lengths in float: a thousandth of this squared is still
 // normal.
 constexpr double kLeastSize_m = 1e-15;
 
-/// Names the stages and keeps their wall times.
+/// Names the stages and keeps their wall times; one that begins again goes on.
 class Stages {
  public:
   explicit Stages(const Progress& progress) : progress_(progress) {}
   void begin(const char* stage) {
     end();
-    times.push_back({stage, 0});
+    now_ = static_cast<std::size_t>(std::ranges::find(times, stage, &StageTime::stage) - times.begin());
+    if (now_ == times.size()) times.push_back({stage, 0});
     start_ = std::chrono::steady_clock::now();
     progress_.at(stage, 0);
   }
   void end() {
     if (times.empty()) return;
-    times.back().seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
+    times[now_].seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
   }
   std::vector<StageTime> times;
 
  private:
   const Progress& progress_;
+  std::size_t now_ = 0;
   std::chrono::steady_clock::time_point start_;
 };
 
@@ -226,6 +230,72 @@ Result<Drawn> draw_smallest(Asset& asset, const std::vector<Piece>& pieces,
   return redrawn;
 }
 
+/// A partition with its maps.
+struct DrawnPartition {
+  Asset asset;
+  std::vector<PartFit> fits;
+  std::string stopped_by;
+  Drawn drawn;
+
+  bool may_be_smaller() const { return stopped_by == "target" && drawn.bytes > kSmallEnough; }
+  /// Fewer bytes, those that more parts cost in time counted, and no more error than there may be.
+  bool is_better_than(const DrawnPartition& other) const {
+    const auto cost = [](const DrawnPartition& p) {
+      return static_cast<double>(p.drawn.bytes) + kPartTimeBytes * static_cast<double>(p.asset.parts.size());
+    };
+    return stopped_by == "target" &&
+           drawn.worst_in_aims() <= std::max(kAtAims, other.drawn.worst_in_aims()) &&
+           cost(*this) < cost(other);
+  }
+};
+
+/// What maps of a partition are drawn from.
+struct PartitionDrawer {
+  const Mesh& mesh;
+  const Mesh& fine;  ///< what parts are made of
+  const MeshQueries& queries;
+  double r_max_m;
+  std::uint32_t source_faces;
+  const BakeOptions& options;
+
+  Result<DrawnPartition> draw(Refinement refinement) const {
+    std::vector<Piece>& pieces = refinement.pieces;
+    sort_pieces(pieces);
+    DrawnPartition result{{}, {}, std::move(refinement.stopped_by), {}};
+    Asset& asset = result.asset;
+    asset.r_max_m = r_max_m;
+    for (const Piece& piece : pieces) {
+      asset.parts.push_back(piece.part);
+      result.fits.push_back(piece.fit);
+    }
+    const std::vector<std::uint16_t> owner = owners(pieces, fine, mesh.faces.size());
+    count_members(asset.parts, mesh, owner);
+    asset.face_labels = label_input_faces(owner, mesh, source_faces);
+    const MapTarget target{options.max_error_percent / 100 * r_max_m, options.max_bytes};
+    std::vector<double> areas_m2;
+    for (const Piece& piece : pieces) areas_m2.push_back(piece.area_m2);
+    auto drawn = draw_smallest(asset, pieces, areas_m2, queries, target, options.seed);
+    if (!drawn) return drawn.error();
+    if (result.stopped_by == "target" && !drawn.value().by_budget && drawn.value().depth_in_aims > kAtAims) {
+      Asset quick = with_quick_fits(asset, pieces);
+      auto redrawn = draw_smallest(quick, pieces, areas_m2, queries, target, options.seed);
+      if (!redrawn) return redrawn.error();
+      if (redrawn.value().depth_in_aims < drawn.value().depth_in_aims) {
+        asset.parts = std::move(quick.parts);
+        asset.sphere = quick.sphere;
+        drawn = redrawn;
+        for (std::size_t k = 0; k < pieces.size(); ++k) result.fits[k] = pieces[k].quick->fit;
+      }
+    }
+    for (std::size_t k = 0; k < pieces.size(); ++k)
+      for (const FittedPart& other : pieces[k].others)
+        if (other.part.shape == asset.parts[k].shape) result.fits[k] = other.fit;
+    if (drawn.value().by_budget) result.stopped_by = "bytes";
+    result.drawn = drawn.value();
+    return result;
+  }
+};
+
 Provenance provenance(const SourceMesh& source, const BakeOptions& options) {
   static constexpr const char* kAxisNames[] = {"x", "y", "z"};
   return {"sqbake",
@@ -283,45 +353,29 @@ Result<BakeResult> bake(const SourceMesh& source, const BakeOptions& asked, cons
   const Mesh fine = fine_mesh(prepared.mesh, kLongestEdge * r_max_m);
   const Decomposition fine_segments = on_fine_faces(std::move(segments).value(), fine);
   auto [set, whole] = SolidSet::whole(fine);
-  auto refined = refine(set, close_segments(set, whole, fine_segments), {fine, rays, oracle, open}, r_max_m,
-                        options, progress);
+  PartitionSearch partitions(set, {fine, rays, oracle, open}, r_max_m, options);
+  auto refined = partitions.best(close_segments(set, whole, fine_segments), progress);
   if (!refined) return refined.error();
-  std::vector<Piece>& pieces = refined.value().pieces;
-  sort_pieces(pieces);
-
+  const PartitionDrawer drawer{prepared.mesh, fine, queries, r_max_m, source.source_face_count, options};
   stages.begin("map");
-  BakeResult result;
-  result.stopped_by = refined.value().stopped_by;
-  Asset& asset = result.asset;
-  asset.r_max_m = r_max_m;
-  for (const Piece& piece : pieces) {
-    asset.parts.push_back(piece.part);
-    result.fits.push_back(piece.fit);
-  }
-  const std::vector<std::uint16_t> owner = owners(pieces, fine, prepared.mesh.faces.size());
-  count_members(asset.parts, prepared.mesh, owner);
-  asset.face_labels = label_input_faces(owner, prepared.mesh, source.source_face_count);
-  const double target_m = options.max_error_percent / 100 * r_max_m;
-  const MapTarget target{target_m, options.max_bytes};
-  std::vector<double> areas_m2;
-  for (const Piece& piece : pieces) areas_m2.push_back(piece.area_m2);
-  auto drawn = draw_smallest(asset, pieces, areas_m2, queries, target, options.seed);
-  if (!drawn) return drawn.error();
-  if (result.stopped_by == "target" && !drawn.value().by_budget && drawn.value().depth_in_aims > kAtAims) {
-    Asset quick = with_quick_fits(asset, pieces);
-    auto redrawn = draw_smallest(quick, pieces, areas_m2, queries, target, options.seed);
+  auto baked = drawer.draw(std::move(refined).value());
+  while (baked && baked.value().may_be_smaller()) {
+    if (progress.stop()) return cancelled();
+    stages.begin("refine");
+    auto other = partitions.other(progress);
+    if (!other) return other.error();
+    if (!other.value()) break;
+    stages.begin("map");
+    auto redrawn = drawer.draw(std::move(*other.value()));
     if (!redrawn) return redrawn.error();
-    if (redrawn.value().depth_in_aims < drawn.value().depth_in_aims) {
-      asset.parts = std::move(quick.parts);
-      asset.sphere = quick.sphere;
-      drawn = redrawn;
-      for (std::size_t k = 0; k < pieces.size(); ++k) result.fits[k] = pieces[k].quick->fit;
-    }
+    if (redrawn.value().is_better_than(baked.value())) baked = std::move(redrawn);
   }
-  for (std::size_t k = 0; k < pieces.size(); ++k)
-    for (const FittedPart& other : pieces[k].others)
-      if (other.part.shape == asset.parts[k].shape) result.fits[k] = other.fit;
-  if (drawn.value().by_budget) result.stopped_by = "bytes";
+  if (!baked) return baked.error();
+  BakeResult result;
+  Asset& asset = result.asset;
+  asset = std::move(baked.value().asset);
+  result.fits = std::move(baked.value().fits);
+  result.stopped_by = std::move(baked.value().stopped_by);
   asset.mesh = prepared.record;
   asset.provenance = provenance(source, asked);
   if (progress.stop()) return cancelled();

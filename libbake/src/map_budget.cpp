@@ -9,6 +9,8 @@
 
 #include <tbb/parallel_for.h>
 
+#include "sqmap/asset/miss_run.hpp"
+
 #include "part_builder.hpp"
 
 namespace sqmap::bake {
@@ -52,11 +54,13 @@ struct Candidate {
   std::vector<Strided> rows, cols;
   double own_error_m{};  ///< of the field itself, foretold from its coarser halves
   double deepest_m{}, hit_share{};
+  double held_share{};  ///< of the texels, those that a loaded object holds
+  bool has_seam{};
 };
 
 struct Choice {
   std::size_t candidate{}, row{}, col{};
-  double error_m{}, bytes{};
+  double error_m{}, texels{};
 };
 
 double error_m(const CoarseningError& e, double depth_gain, double occupancy_gain) {
@@ -86,6 +90,18 @@ Candidate trace(const PlacedShape& placed, const MeshQueries& queries, const Qua
   std::size_t hits = 0;
   for (std::uint32_t texel = 0; texel < rows * cols; ++texel) hits += field.has_hit(texel);
   candidate.hit_share = static_cast<double>(hits) / (rows * cols);
+  std::size_t held = 0;
+  for (std::uint32_t row = 0; row < rows; ++row) {
+    const MissRun run = longest_miss_run(cols, [&](std::uint32_t col) {
+      const std::uint32_t texel = row * cols + col;
+      return field.has_hit(texel)             ? RayKind::kHit
+             : field.start_inside[texel] != 0 ? RayKind::kInnerMiss
+                                              : RayKind::kMiss;
+    });
+    held += cols - run.count;
+  }
+  candidate.held_share = static_cast<double>(held) / (rows * cols);
+  candidate.has_seam = std::ranges::any_of(field.start_inside, [](std::uint8_t s) { return s != 0; });
   const auto by_rows = [&](std::uint32_t stride) { return coarsening_error(field, grid, stride, 1); };
   const auto by_cols = [&](std::uint32_t stride) { return coarsening_error(field, grid, 1, stride); };
   candidate.rows = strides(cells.rows, by_rows);
@@ -103,8 +119,12 @@ using Candidates = std::vector<std::vector<Candidate>>;
 class Allotment {
  public:
   Allotment(const Candidates& candidates, const std::vector<double>& weights, double target_m,
-            std::size_t most_shapes)
-      : candidates_(candidates), weights_(weights), target_m_(target_m), most_shapes_(most_shapes) {}
+            std::size_t most_shapes, TexelCost cost)
+      : candidates_(candidates),
+        weights_(weights),
+        target_m_(target_m),
+        most_shapes_(most_shapes),
+        cost_(cost) {}
 
   /// The maps of least error plus price [m a byte].
   std::vector<Choice> at(double price) const {
@@ -121,8 +141,10 @@ class Allotment {
   /// In the file.
   double stored_bytes(const std::vector<Choice>& choices) const {
     double sum = 0;
-    for (std::size_t k = 0; k < choices.size(); ++k)
-      sum += kStoredShare * candidates_[k][choices[k].candidate].hit_share * choices[k].bytes;
+    for (std::size_t k = 0; k < choices.size(); ++k) {
+      const Candidate& candidate = candidates_[k][choices[k].candidate];
+      sum += kStoredShare * candidate.hit_share * choices[k].texels * bits(candidate) / 8;
+    }
     return sum;
   }
   std::uint32_t bits(const Candidate& candidate) const {
@@ -147,17 +169,22 @@ class Allotment {
     double least = std::numeric_limits<double>::infinity();
     for (std::size_t k = 0; k < std::min(candidates.size(), most_shapes_); ++k) {
       const Candidate& candidate = candidates[k];
-      const double texel_bytes = bits(candidate) / 8.0;
+      const bool held_only = cost_ == TexelCost::kHeld;
+      const double texel_bits = held_only
+                                    ? candidate.held_share * (bits(candidate) + (candidate.has_seam ? 1 : 0))
+                                    : bits(candidate);
+      const double row_bytes = held_only ? 4 : 0;
       for (std::size_t r = 0; r < candidate.rows.size(); ++r) {
         for (std::size_t c = 0; c < candidate.cols.size(); ++c) {
           const Strided &row = candidate.rows[r], &col = candidate.cols[c];
           const double error_m = row.error_m + col.error_m + candidate.own_error_m;
           const double rows = 2.0 * candidate.cells->rows / row.stride + 1;
-          const double bytes = rows * 4.0 * candidate.cells->cols / col.stride * texel_bytes;
+          const double texels = rows * 4.0 * candidate.cells->cols / col.stride;
+          const double bytes = row_bytes * rows + texels * texel_bits / 8;
           const double cost = weight * error_m + price * bytes;
           if (cost < least) {
             least = cost;
-            best = {k, r, c, error_m, bytes};
+            best = {k, r, c, error_m, texels};
           }
         }
       }
@@ -169,6 +196,7 @@ class Allotment {
   const std::vector<double>& weights_;
   double target_m_;
   std::size_t most_shapes_;
+  TexelCost cost_;
 };
 
 }  // namespace
@@ -227,9 +255,10 @@ MapDrawer::MapDrawer(const std::vector<std::vector<PlacedShape>>& shapes, const 
 
 MapDrawer::~MapDrawer() = default;
 
-bool MapDrawer::draw(std::vector<Part>& parts, const MapTarget& target, std::size_t most_shapes) {
+bool MapDrawer::draw(std::vector<Part>& parts, const MapTarget& target, std::size_t most_shapes,
+                     TexelCost cost) {
   const Candidates& candidates = impl_->candidates;
-  const Allotment allotment(candidates, impl_->weights, target.error_m, most_shapes);
+  const Allotment allotment(candidates, impl_->weights, target.error_m, most_shapes, cost);
   const auto meets_target = [&](const std::vector<Choice>& c) {
     return allotment.mean_error_m(c) <= target.error_m;
   };

@@ -27,6 +27,10 @@ struct MapTarget {
   std::uint64_t max_bytes;  ///< of all maps in the file, about
 };
 
+/// Which texels of a map count: all, or those that a loaded object holds (libruntime/src/resident.hpp), with
+/// its rows. By the former, maps that miss much are coarser.
+enum class TexelCost { kAll, kHeld };
+
 /// Of the maps in a file, about.
 double stored_bytes(const std::vector<Part>& parts);
 
@@ -44,7 +48,7 @@ class MapDrawer {
   /// memory that meet the target together. What a byte is worth is the same everywhere (one Lagrange
   /// multiplier for all parts): a large smooth part may err more than the target so that a small rough one
   /// need not cost much, or the other way round. True: the byte budget, not the target, decided.
-  bool draw(std::vector<Part>& parts, const MapTarget& target, std::size_t most_shapes);
+  bool draw(std::vector<Part>& parts, const MapTarget& target, std::size_t most_shapes, TexelCost cost);
 
   /// The next finer maps that rays are at hand for, of a part with a map that draw() gave part k: in rows, in
   /// columns, in bits.

@@ -23,8 +23,9 @@ namespace {
 // Vertex samples are kept where the surface misses the vertex by this multiple of the error target.
 constexpr double kVertexTolerance = 2;
 // Shells that finished maps are judged in: points, and half widths as shares of R_max. Of the narrow one's
-// points five times as many are on the wrong side.
-constexpr std::uint32_t kShellPoints = 16000;
+// points five times as many are on the wrong side. Few points do for objects that are small enough: others
+// have maps that are chosen by what points say, and learn them.
+constexpr std::uint32_t kFewShellPoints = 16000, kShellPoints = 40000;
 constexpr double kShellWidth = 0.03, kNarrowShellWidth = 0.005;
 // Maps are drawn at most so often. Each time their target changes by the root of what the worse error is off
 // its aim: downwards a little more, and only as long as an error that exceeds its aim falls by a fifth of
@@ -168,7 +169,7 @@ Result<Drawn> sharpen(Asset& asset, Shortfall now, const MapDrawer& drawer, cons
     }
     if (!(now.excess() < before)) break;
   }
-  return Drawn{now.depth, over_budget && now.worse() > kAtAims, now.bytes};
+  return Drawn{now.depth, now.sides, over_budget && now.worse() > kAtAims, now.bytes};
 }
 
 bool have_same_texels(const std::vector<Part>& a, const std::vector<Part>& b) {
@@ -182,8 +183,19 @@ bool have_same_texels(const std::vector<Part>& a, const std::vector<Part>& b) {
 
 Result<Drawn> draw_maps(Asset& asset, MapDrawer& drawer, std::size_t most_shapes, const MeshQueries& queries,
                         const MapTarget& target, std::size_t small_enough, std::uint64_t seed) {
-  const Shells shells{sample_shell(queries, kShellWidth * asset.r_max_m, kShellPoints, seed),
-                      sample_shell(queries, kNarrowShellWidth * asset.r_max_m, kShellPoints, seed + 1)};
+  const auto shells_of = [&](std::uint32_t points) {
+    return Shells{sample_shell(queries, kShellWidth * asset.r_max_m, points, seed),
+                  sample_shell(queries, kNarrowShellWidth * asset.r_max_m, points, seed + 1)};
+  };
+  Shells shells = shells_of(kFewShellPoints);
+  const auto finish_and_judge = [&] {
+    asset.sphere = enclosing_sphere(asset.parts);
+    tbb::parallel_for(std::size_t{0}, asset.parts.size(), [&](std::size_t k) {
+      add_vertex_samples(asset.parts[k], queries, kVertexTolerance * target.error_m);
+    });
+    return judge(asset, shells, target.error_m);
+  };
+  TexelCost cost = TexelCost::kAll;
   std::vector<Part> best, coarser;
   Shortfall least;
   bool by_budget = false;
@@ -191,20 +203,22 @@ Result<Drawn> draw_maps(Asset& asset, MapDrawer& drawer, std::size_t most_shapes
   double share = 1;  // of the target before
   double met_m = 0, failed_m = kLoosest * target.error_m;
   for (int round = 0; round < kMapRounds; ++round) {
-    bool budget_decided = drawer.draw(asset.parts, asked, most_shapes);
     const bool had_met = met_m > 0;
     // Maps come in steps: on, down to a target that asks for others.
     const double step = share;
+    bool budget_decided = drawer.draw(asset.parts, asked, most_shapes, cost);
     for (int k = 0; k < kMostSteps && round > 0 && !had_met && have_same_texels(asset.parts, best); ++k) {
       asked.error_m *= step;
       share *= step;
-      budget_decided = drawer.draw(asset.parts, asked, most_shapes);
+      budget_decided = drawer.draw(asset.parts, asked, most_shapes, cost);
     }
-    asset.sphere = enclosing_sphere(asset.parts);
-    tbb::parallel_for(std::size_t{0}, asset.parts.size(), [&](std::size_t k) {
-      add_vertex_samples(asset.parts[k], queries, kVertexTolerance * target.error_m);
-    });
-    const auto judged = judge(asset, shells, target.error_m);
+    auto judged = finish_and_judge();
+    if (round == 0 && judged && judged.value().bytes > small_enough) {
+      shells = shells_of(kShellPoints);
+      cost = TexelCost::kHeld;
+      budget_decided = drawer.draw(asset.parts, asked, most_shapes, cost);
+      judged = finish_and_judge();
+    }
     if (!judged) return judged.error();
     const Shortfall& now = judged.value();
     const bool meets = now.worse() <= 1;
@@ -237,10 +251,10 @@ Result<Drawn> draw_maps(Asset& asset, MapDrawer& drawer, std::size_t most_shapes
   asset.parts = std::move(best);
   asset.sphere = enclosing_sphere(asset.parts);
   if (!by_budget && met_m == 0) return sharpen(asset, least, drawer, queries, shells, target);
-  if (by_budget || coarser.empty()) return Drawn{least.depth, by_budget, least.bytes};
+  if (by_budget || coarser.empty()) return Drawn{least.depth, least.sides, by_budget, least.bytes};
   auto given = give_back(asset, least, coarser, shells, target.error_m);
   if (!given) return given.error();
-  return Drawn{given.value().depth, by_budget, given.value().bytes};
+  return Drawn{given.value().depth, given.value().sides, by_budget, given.value().bytes};
 }
 
 }  // namespace sqmap::bake

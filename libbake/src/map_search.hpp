@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 
@@ -20,8 +21,11 @@ inline constexpr std::size_t kSmallEnough = 65536;
 
 struct Drawn {
   double depth_in_aims;  ///< mean error of distances near the surface, over what it may be
+  double sides_in_aims;  ///< share of points on the wrong side, over what it may be
   bool by_budget;        ///< the byte budget decided
   std::size_t bytes;     ///< of the object in memory
+
+  double worst_in_aims() const { return std::max(depth_in_aims, sides_in_aims); }
 };
 
 /// Maps that meet the aims and, in an object of more than `small_enough` bytes, no finer ones than that

@@ -7,9 +7,12 @@
 #include <numeric>
 #include <optional>
 #include <tuple>
+#include <utility>
 
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_invoke.h>
+
+#include "sqmap/asset/miss_run.hpp"
 
 #include "measure.hpp"
 #include "part_builder.hpp"
@@ -35,12 +38,23 @@ constexpr double kWorthSplitting = 2;
 // superquadrics enclose beside the mesh: where that is large maps see the surface from far off and at a
 // slant.
 constexpr double kVolumeShare = 0.3;
-// Bytes that a target of what drafts lose would ask for in all, as the six samples have it; and those of a
-// part itself, with as many again for the time it takes at run time.
-constexpr double kDraftBytes = 4000;
-constexpr double kPartBytes = 4000;
+// Bytes that a target of what drafts lose asks for in all: 4,200 to 8,300 of eleven meshes; and those of a
+// part itself, with as many again for the time it takes at run time. The best partition counts more for a
+// part: where a few parts do, drafts foretell too little of what more would save.
+constexpr double kDraftBytes = 5000;
+constexpr double kPartBytes = 2500, kBestPartBytes = 5000;
 // So many splits that do not pay are kept on trial, one after another, before the search ends.
 constexpr int kMostTrials = 4;
+// Of those that only save bytes: the least share they must save, and how many in a row may not.
+constexpr double kWorthSaving = 0.01;
+constexpr int kMostVainSplits = 8;
+
+/// Of the texels of a map, those that a loaded object holds.
+double held_share(const DistanceMap& map) {
+  double held = 0;
+  for (std::uint32_t row = 0; row < map.rows; ++row) held += map.cols - longest_miss_run(map, row).count;
+  return held / (1.0 * map.rows * map.cols);
+}
 
 /// A cell with a quick fit and a draft map, enough to judge it by.
 Result<Piece> draft_piece(const SolidSet& set, Cell cell, const MeshQueries& queries, FitOptions options) {
@@ -49,9 +63,10 @@ Result<Piece> draft_piece(const SolidSet& set, Cell cell, const MeshQueries& que
   auto fitted = fit_part(set, cell.solid, options);
   if (!fitted) return fitted.error();
   Piece piece{
-      std::move(cell), {}, std::move(fitted.value().part), fitted.value().fit, 0, 0, {}, {}, {}, 0, {}};
+      std::move(cell), {}, std::move(fitted.value().part), fitted.value().fit, 0, 0, 0, {}, {}, {}, 0, {}};
   piece.label();
   piece.loss_m = draft_map(piece.part, queries, kDraftQuadrantCells);
+  piece.held_share = held_share(piece.part.map);
   for (const std::uint32_t face : piece.cell.solid.face)
     if (face != kNewFace) piece.area_m2 += area_m2(queries.mesh, face);
   return piece;
@@ -202,43 +217,86 @@ class Refiner {
     return true;
   }
 
+  /// Splits the worst piece of those with a cut left to try, and keeps the split if maps need fewer bytes for
+  /// it and the error is no greater beyond its target. False: no piece has one, or too many in a row did not
+  /// pay.
+  Result<bool> split_to_save() {
+    if (trials_ == kMostVainSplits) return false;
+    const std::optional<std::size_t> worst = worst_of(0, [&](Piece& piece) { return can_split(piece); });
+    if (!worst) return false;
+    Piece before = pieces[*worst];
+    const std::vector<double> error_before_m = error_m_;
+    const double cost_before = cost(kPartBytes);
+    if (auto outcome = split(*worst, before.cuts_tried); !outcome) return outcome.error();
+    if (cost(kPartBytes) < (1 - kWorthSaving) * cost_before) {
+      trials_ = 0;
+      return true;
+    }
+    ++trials_;
+    ++before.cuts_tried;
+    pieces[*worst] = std::move(before);
+    pieces.pop_back();
+    error_m_ = error_before_m;
+    return true;
+  }
+
   void remember_best() {
-    const double cost_now = cost();
-    if (!best_pieces_.empty() && !(cost_now < least_cost_)) return;  // it may not be finite
-    least_cost_ = cost_now;
-    best_pieces_ = pieces;
-    best_error_m_ = error_m_;
-    trials_ = 0;
+    const auto remember = [&](Snapshot& best, double cost_now) {
+      if (!best.pieces.empty() && !(cost_now < best.cost)) return false;  // it may not be finite
+      best = {pieces, error_m_, cost_now};
+      return true;
+    };
+    if (remember(best_, cost(kBestPartBytes))) trials_ = 0;
+    if (is_within_target()) remember(smallest_, bytes(kPartBytes));
   }
 
   /// Goes back to the best partition there was.
   void end() {
     remember_best();
-    pieces = std::move(best_pieces_);
-    error_m_ = std::move(best_error_m_);
+    go_to(best_);
   }
+  /// Goes to that of fewest bytes which errs no more than final maps may. False: it is the best.
+  bool go_to_smallest() {
+    if (smallest_.pieces.empty() || smallest_.pieces.size() == best_.pieces.size()) return false;
+    go_to(smallest_);
+    return true;
+  }
+  void go_to_best() { go_to(best_); }
 
   std::vector<Piece> pieces;
 
  private:
+  struct Snapshot {
+    std::vector<Piece> pieces;
+    std::vector<double> error_m;
+    double cost{};
+  };
+
+  void go_to(const Snapshot& snapshot) {
+    pieces = snapshot.pieces;
+    error_m_ = snapshot.error_m;
+    trials_ = 0;
+  }
   double error_m() const { return std::accumulate(error_m_.begin(), error_m_.end(), 0.0); }
   /// Bytes in memory that maps of the target's error will need, about. A map errs in inverse proportion to
   /// the root of its texels: so maps that lose e_k at some resolution and count by their areas w_k meet a
-  /// mean error T with fewest texels together at (sum (w_k e_k)^(2/3))^3 / T^2 times those of that
-  /// resolution.
-  double bytes() const {
+  /// mean error T with fewest texels together, of which they hold the shares h_k, at
+  /// (sum (w_k e_k)^(2/3) h_k^(1/3))^3 / T^2 times those of that resolution.
+  double bytes(double part_bytes) const {
     double sum = 0, all_m2 = 0;
     for (const Piece& piece : pieces) {
-      sum += std::cbrt(std::pow(piece.area_m2 * piece.loss_m, 2));
+      sum += std::cbrt(std::pow(piece.area_m2 * piece.loss_m, 2) * piece.held_share);
       all_m2 += piece.area_m2;
     }
     const double mean_m = options_.max_error_percent / 100 * r_max_m_;
     const double drafts = std::pow(sum, 3) / std::pow(all_m2 * mean_m, 2);
-    return kDraftBytes * drafts + kPartBytes * static_cast<double>(pieces.size());
+    return kDraftBytes * drafts + part_bytes * static_cast<double>(pieces.size());
   }
   /// What the best partition has least of: bytes, times the square of what the error exceeds its target by,
   /// since the bytes of maps grow like that.
-  double cost() const { return bytes() * std::pow(std::max(error_m() / target_m_, 1.0), 2); }
+  double cost(double part_bytes) const {
+    return bytes(part_bytes) * std::pow(std::max(error_m() / target_m_, 1.0), 2);
+  }
 
   double price_m() const { return kPartPrice * target_m_ / options_.max_parts; }
 
@@ -297,28 +355,51 @@ class Refiner {
   }
 
   SolidSet& set_;
-  const MeshQueries& queries_;
+  MeshQueries queries_;
   double r_max_m_;
   const BakeOptions& options_;
   double target_m_;  ///< the error that all shell points together may have
   ShellPoints shell_;
   std::vector<double> error_m_;  ///< that each piece adds to the sum over the shell
   int trials_ = 0;               ///< since the best partition
-  double least_cost_ = std::numeric_limits<double>::infinity();
-  std::vector<Piece> best_pieces_;
-  std::vector<double> best_error_m_;
+  Snapshot best_, smallest_;
 };
 
 }  // namespace
 
-Result<Refinement> refine(SolidSet& set, std::vector<Cell> cells, const MeshQueries& queries, double r_max_m,
-                          const BakeOptions& options, const Progress& progress) {
-  Refiner refiner(set, queries, r_max_m, options);
+struct PartitionSearch::Impl {
+  Impl(SolidSet& set_of, const MeshQueries& queries, double r_max_m, const BakeOptions& baked_by)
+      : set(set_of), options(baked_by), refiner(set_of, queries, r_max_m, baked_by) {}
+
+  /// The refiner's pieces, without what others hold and with their full fits.
+  Result<Refinement> finished() {
+    const bool is_full = refiner.pieces.size() >= options.max_parts;
+    Refinement result{refiner.pieces, refiner.is_within_target() ? "target" : is_full ? "parts" : "gain"};
+    shed_covered(set, result.pieces, options.fit);
+    if (auto outcome = fit_pieces(set, result.pieces, options.fit); !outcome) return outcome.error();
+    return result;
+  }
+  bool may_split() const { return refiner.pieces.size() < options.max_parts; }
+
+  SolidSet& set;
+  const BakeOptions& options;
+  Refiner refiner;
+  bool was_smallest = false, was_finer = false;
+};
+
+PartitionSearch::PartitionSearch(SolidSet& set, const MeshQueries& queries, double r_max_m,
+                                 const BakeOptions& options)
+    : impl_(std::make_unique<Impl>(set, queries, r_max_m, options)) {}
+
+PartitionSearch::~PartitionSearch() = default;
+
+Result<Refinement> PartitionSearch::best(std::vector<Cell> cells, const Progress& progress) {
+  Refiner& refiner = impl_->refiner;
   if (auto outcome = refiner.start(std::move(cells)); !outcome) return outcome.error();
   bool can_gain = true;
-  while (can_gain && !refiner.meets_target() && refiner.pieces.size() < options.max_parts) {
+  while (can_gain && !refiner.meets_target() && impl_->may_split()) {
     if (progress.stop()) return Error{Status::kCancelled, "cancelled while refining parts", ""};
-    progress.at("refine", static_cast<double>(refiner.pieces.size()) / options.max_parts);
+    progress.at("refine", static_cast<double>(refiner.pieces.size()) / impl_->options.max_parts);
     refiner.remember_best();
     auto split = refiner.split_worst();
     if (split && !split.value()) split = refiner.split_on_trial();
@@ -326,13 +407,27 @@ Result<Refinement> refine(SolidSet& set, std::vector<Cell> cells, const MeshQuer
     can_gain = split.value();
   }
   refiner.end();
-  const bool is_full = refiner.pieces.size() >= options.max_parts;
-  Refinement result{std::move(refiner.pieces), refiner.is_within_target() ? "target"
-                                               : is_full                  ? "parts"
-                                                                          : "gain"};
-  shed_covered(set, result.pieces, options.fit);
-  if (auto outcome = fit_pieces(set, result.pieces, options.fit); !outcome) return outcome.error();
-  return result;
+  return impl_->finished();
+}
+
+Result<std::optional<Refinement>> PartitionSearch::other(const Progress& progress) {
+  Refiner& refiner = impl_->refiner;
+  const auto finished = [&]() -> Result<std::optional<Refinement>> {
+    auto result = impl_->finished();
+    if (!result) return result.error();
+    return std::optional(std::move(result).value());
+  };
+  if (!std::exchange(impl_->was_smallest, true) && refiner.go_to_smallest()) return finished();
+  if (std::exchange(impl_->was_finer, true)) return std::optional<Refinement>();
+  refiner.go_to_best();
+  const std::size_t parts = refiner.pieces.size();
+  for (bool can_gain = true; can_gain && impl_->may_split();) {
+    if (progress.stop()) return Error{Status::kCancelled, "cancelled while refining parts", ""};
+    auto split = refiner.split_to_save();
+    if (!split) return split.error();
+    can_gain = split.value();
+  }
+  return refiner.pieces.size() > parts ? finished() : std::optional<Refinement>();
 }
 
 }  // namespace sqmap::bake

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -25,6 +26,7 @@ struct Piece {
   Part part;
   PartFit fit;
   double loss_m{};                             ///< draft_map()
+  double held_share{};                         ///< of that map's texels, those that a loaded object holds
   double area_m2{};                            ///< surface of the mesh in the cell
   std::optional<FittedPart> quick;             ///< a quick fit, once `part` is the full one
   std::vector<FittedPart> others;              ///< the full fits of FitOptions::taper and bend
@@ -44,15 +46,31 @@ struct Refinement {
   std::string stopped_by;  ///< "target", "parts" or "gain": no split lowers the error further
 };
 
-/// Splits the parts that add most to the signed-distance error near the surface, and that enclose most beside
-/// the mesh, again and again, until the mean error is within the target, the parts are spent, or no split
-/// pays. A split that does not lower the error is undone: it would cost bytes, and its seam is one more place
-/// where rays see little. Where nothing else is left, splits that do not pay are kept on trial, for what
-/// their halves may gain. The result is the partition on the way whose maps need fewest bytes, where it errs
-/// beyond the target the more; its parts are rid of what others hold (shed.hpp) and have their full fits.
-/// Errors: kCancelled, kBakeFailed.
-Result<Refinement> refine(SolidSet& set, std::vector<Cell> cells, const MeshQueries& queries, double r_max_m,
-                          const BakeOptions& options, const Progress& progress);
+/// The partitions that a mesh may be baked with.
+class PartitionSearch {
+ public:
+  PartitionSearch(SolidSet& set, const MeshQueries& queries, double r_max_m, const BakeOptions& options);
+  ~PartitionSearch();
+  PartitionSearch(PartitionSearch&&) = delete;
+
+  /// Splits the parts that add most to the signed-distance error near the surface, and that enclose most
+  /// beside the mesh, again and again, until the mean error is within the target, the parts are spent, or no
+  /// split pays. A split that does not lower the error is undone: it would cost bytes, and its seam is one
+  /// more place where rays see little. Where nothing else is left, splits that do not pay are kept on trial,
+  /// for what their halves may gain. The result is the partition on the way whose maps are foretold to need
+  /// fewest bytes, where it errs beyond the target the more; its parts are rid of what others hold
+  /// (shed.hpp) and have their full fits. Errors: kCancelled, kBakeFailed.
+  Result<Refinement> best(std::vector<Cell> cells, const Progress& progress);
+
+  /// After best(): another partition within the target whose maps may turn out to need fewer bytes, each time
+  /// a different one: that of fewest bytes foretold, whatever its error; then one of the best's parts, split
+  /// on as long as that is foretold to save. Empty: there is none left. Errors: as of best().
+  Result<std::optional<Refinement>> other(const Progress& progress);
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
 
 /// The smallest sphere found around the parts' spheres, object frame.
 BoundingSphere enclosing_sphere(const std::vector<Part>& parts);

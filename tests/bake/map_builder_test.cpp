@@ -143,9 +143,9 @@ TEST(MapParts, SpendTexelsOnlyWhereTheTargetAsksForThem) {
   std::vector<Part> parts{part_around({{0.9, 1.0, 1.1}, 0.7, 0.7})};
   const MeshQueries queries = scene.queries();
   MapDrawer drawer(own_shapes(parts), {1.0}, queries);
-  EXPECT_FALSE(drawer.draw(parts, {1e-2, kNoLimit}, 1));
+  EXPECT_FALSE(drawer.draw(parts, {1e-2, kNoLimit}, 1, TexelCost::kAll));
   const auto coarse = parts[0].map.code.size();
-  EXPECT_FALSE(drawer.draw(parts, {1e-3, kNoLimit}, 1));
+  EXPECT_FALSE(drawer.draw(parts, {1e-3, kNoLimit}, 1, TexelCost::kAll));
   EXPECT_GT(parts[0].map.code.size(), 2 * coarse);
   EXPECT_GE(parts[0].map.bits, 8U);
 }
@@ -155,15 +155,29 @@ TEST(MapParts, GiveTexelsToThePartWithTheLargerShareOfTheSurface) {
   const Part part = part_around({{0.9, 1.0, 1.1}, 0.7, 0.7});
   std::vector<Part> parts{part, part};
   const MeshQueries queries = scene.queries();
-  MapDrawer(own_shapes(parts), {1.0, 20.0}, queries).draw(parts, {2e-3, kNoLimit}, 1);
+  MapDrawer(own_shapes(parts), {1.0, 20.0}, queries).draw(parts, {2e-3, kNoLimit}, 1, TexelCost::kAll);
   EXPECT_GT(parts[1].map.code.size(), 2 * parts[0].map.code.size());
+}
+
+TEST(MapParts, GiveTexelsToThePartWhoseRaysMissWhereThoseTakeNoMemory) {
+  const Scene scene(test::box({0.4, 0.5, 0.6}));
+  const Part whole = part_around({{0.9, 1.0, 1.1}, 0.7, 0.7});
+  Part beside = whole;
+  beside.object_from_part.translation_m.x = 1;  // most of its rays pass the box
+  const MeshQueries queries = scene.queries();
+  const auto share_of = [&](TexelCost cost) {
+    std::vector<Part> parts{whole, beside};
+    MapDrawer(own_shapes(parts), {1.0, 1.0}, queries).draw(parts, {2e-3, kNoLimit}, 1, cost);
+    return double(parts[1].map.code.size()) / double(parts[0].map.code.size());
+  };
+  EXPECT_GT(share_of(TexelCost::kHeld), 1.2 * share_of(TexelCost::kAll));
 }
 
 TEST(MapParts, KeepToTheByteBudgetAndSaySo) {
   const Scene scene(test::box({0.4, 0.5, 0.6}));
   std::vector<Part> parts{part_around({{0.9, 1.0, 1.1}, 0.7, 0.7})};
   const MeshQueries queries = scene.queries();
-  EXPECT_TRUE(MapDrawer(own_shapes(parts), {1.0}, queries).draw(parts, {1e-4, 2000}, 1));
+  EXPECT_TRUE(MapDrawer(own_shapes(parts), {1.0}, queries).draw(parts, {1e-4, 2000}, 1, TexelCost::kAll));
   EXPECT_LE(parts[0].map.code.size() * parts[0].map.bits / 8, 3000U);
 }
 
