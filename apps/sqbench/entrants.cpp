@@ -103,10 +103,19 @@ std::vector<Entrant> frame_entrants(const Model& model, bool smoke) {
   return entrants;
 }
 
+/// The levels that tell more than nothing: answers with the sides swapped err by twice the mean distance of
+/// the shell's points, which is 1.5 % of R_max.
+std::uint32_t useful_levels(const Asset& asset) {
+  constexpr double kMost_percent = 2.5;
+  std::uint32_t levels = 1;
+  for (const ErrorRow& row : asset.errors)
+    if (row.layer > 1 && row.depth_mean_percent < kMost_percent) levels = std::max(levels, row.level + 1);
+  return levels;
+}
+
 std::vector<Entrant> accuracy_entrants(const Model& model, bool smoke) {
   std::vector<Entrant> entrants;
-  std::uint32_t levels = 1;
-  for (const Part& part : model.asset.parts) levels = std::max(levels, part.map.level_count);
+  const std::uint32_t levels = useful_levels(model.asset);
   for (const int layer : {2, 3})
     for (unsigned level = 0; level < levels; ++level)
       entrants.push_back(sqmap_entrant(layer, level, rows_of(model.asset, level)));
