@@ -173,7 +173,7 @@ class Allotment {
       const double texel_bits = held_only
                                     ? candidate.held_share * (bits(candidate) + (candidate.has_seam ? 1 : 0))
                                     : bits(candidate);
-      const double row_bytes = held_only ? 4 : 0;
+      const double row_bytes = held_only ? 3 : 0;
       for (std::size_t r = 0; r < candidate.rows.size(); ++r) {
         for (std::size_t c = 0; c < candidate.cols.size(); ++c) {
           const Strided &row = candidate.rows[r], &col = candidate.cols[c];

@@ -195,11 +195,13 @@ class Looker {
   }
   HWY_INLINE void row_words(VI row, VI (&words)[4]) const noexcept {
     const std::uint8_t* base = resident_.bytes() + part_.texels_at - part_.row_bytes();
-    const auto word_at = [&](VI r)
-                             HWY_ATTR { return hn::BitCast(kDI, gather_bytes(base, hn::ShiftLeft<2>(r))); };
-    const VI one = all_int(1), above = row + all_int(stride_);
-    words[0] = word_at(row);
-    words[1] = word_at(row + one);
+    const auto size = static_cast<std::int32_t>(part_.row_word_bytes());
+    const VI mask = hn::BitCast(kDI, hn::Set(kDU, part_.row_word_mask()));
+    const auto word_at = [&](VI at)
+                             HWY_ATTR { return hn::And(hn::BitCast(kDI, gather_bytes(base, at)), mask); };
+    const VI one = all_int(size), at = row * one, above = at + all_int(stride_ * size);
+    words[0] = word_at(at);
+    words[1] = word_at(at + one);
     words[2] = stride_ == 1 ? words[1] : word_at(above);
     words[3] = word_at(above + one);
   }

@@ -113,10 +113,11 @@ void put_texels(Layout& out, const DistanceMap& map, const std::vector<MapRow>& 
   while (units() >> place_bits != 0) ++record.row_shift;
   std::uint32_t at = 0;
   for (const MapRow& row : rows) {
-    out.put(at | ((row.first << 1U) | (row.inside ? 1U : 0U)) << place_bits);
+    const std::uint32_t word = at | ((row.first << 1U) | (row.inside ? 1U : 0U)) << place_bits;
+    out.put(&word, record.row_word_bytes());  // little-endian, as all that is held
     at += units_of(row);
   }
-  out.put(at);
+  out.put(&at, record.row_word_bytes());
   record.texels_at = out.at();
   BitPacker packer(out);
   for (std::uint32_t row = 0; row < map.rows; ++row) {
@@ -138,7 +139,9 @@ std::uint16_t packed(double value, double unit) {
 float unit_for(double most) { return rounded_up(most / kMostPacked); }
 
 struct PackedCurve {
-  std::uint16_t c_fall[kCells], s_rise[kCells], c_step[kCells + 1], s_step[kCells + 1];
+  /// turn: tan(phi / 2), phi from 0 to pi/2 the angle from the direction of s to the tangent of the curve
+  /// that is not tapered, in metres.
+  std::uint16_t c_fall[kCells], s_rise[kCells], turn[kCells + 1];
 };
 
 static_assert(2 * sizeof(PackedCurve) == Resident::kCurveBytes);
@@ -160,23 +163,25 @@ struct StoredCurve {
   CurveUnits units;
 };
 
-StoredCurve pack(const CurveTable<double>& curve) {
-  double c_fallen[kCells + 1], c_fall = 0, s_rise = 0, c_step = 0, s_step = 0;
+StoredCurve pack(double alpha_m, double beta_m, double e, double taper = 0) {
+  const auto curve = CurveTable<double>::of(alpha_m, beta_m, e, taper);
+  double c_fallen[kCells + 1], c_fall = 0, s_rise = 0;
   for (int k = 0; k <= kCells; ++k) {
     c_fallen[kCells - k] = curve.c[k];  // from the end, where c is exactly 0
-    c_step = std::max(c_step, -curve.c_step[k]);
-    s_step = std::max(s_step, curve.s_step[k]);
     if (k == 0) continue;
     c_fall = std::max(c_fall, curve.c[k - 1] - curve.c[k]);
     s_rise = std::max(s_rise, curve.s[k] - curve.s[k - 1]);
   }
-  const CurveUnits units{unit_for(c_fall), unit_for(s_rise), unit_for(c_step), unit_for(s_step)};
+  // The tangents of the tapered curve are all of one length.
+  const double step_m = std::hypot(alpha_m * curve.tapered(taper).c_step[0], beta_m * curve.s_step[0]);
+  const CurveUnits units{unit_for(c_fall), unit_for(s_rise), static_cast<float>(step_m / alpha_m),
+                         static_cast<float>(step_m / beta_m)};
   PackedCurve result{};
   pack_differences(c_fallen, double{units.c}, result.c_fall);
   pack_differences(curve.s, double{units.s}, result.s_rise);
   for (int k = 0; k <= kCells; ++k) {
-    result.c_step[k] = packed(-curve.c_step[k], double{units.c_step});
-    result.s_step[k] = packed(curve.s_step[k], double{units.s_step});
+    const double phi = std::atan2(-alpha_m * curve.c_step[k], beta_m * curve.s_step[k]);
+    result.turn[k] = packed(std::tan(phi / 2), 1 / kMostPacked);
   }
   return {result, units};
 }
@@ -185,8 +190,7 @@ StoredCurve pack(const CurveTable<double>& curve) {
 struct Prepared {
   explicit Prepared(const Part& part)
       : eta(meridian(part.shape, part.shape.taper)),
-        omega(
-            pack(CurveTable<double>::of(part.shape.semi_axes_m.x, part.shape.semi_axes_m.y, part.shape.e2))),
+        omega(pack(part.shape.semi_axes_m.x, part.shape.semi_axes_m.y, part.shape.e2)),
         rows(rows_of(part.map)) {
     if (part.shape.taper != 0) eta_below = meridian(part.shape, -part.shape.taper);
   }
@@ -195,13 +199,14 @@ struct Prepared {
 
  private:
   static StoredCurve meridian(const Superquadric& shape, double taper) {
-    return pack(CurveTable<double>::of(std::sqrt(shape.semi_axes_m.x * shape.semi_axes_m.y),
-                                       shape.semi_axes_m.z, shape.e1, taper));
+    return pack(std::sqrt(shape.semi_axes_m.x * shape.semi_axes_m.y), shape.semi_axes_m.z, shape.e1, taper);
   }
 };
 static_assert(sizeof(StoredCurve) == Resident::kBelowBytes);
 
-void unpack_curve(const PackedCurve& curve, const CurveUnits& units, CurveTable<float>& out) noexcept {
+/// taper: of the curve on whose arcs the nodes lie; `out` is without.
+void unpack_curve(const PackedCurve& curve, const CurveUnits& units, float taper,
+                  CurveTable<float>& out) noexcept {
   // Sums first, then loops that the compiler turns into vectors.
   std::int32_t c[kCells + 1], s[kCells + 1];
   c[kCells] = s[0] = 0;
@@ -211,11 +216,23 @@ void unpack_curve(const PackedCurve& curve, const CurveUnits& units, CurveTable<
   }
   for (int k = 0; k <= kCells; ++k) out.c[k] = units.c * static_cast<float>(c[k]);
   for (int k = 0; k <= kCells; ++k) out.s[k] = units.s * static_cast<float>(s[k]);
+  constexpr float kTurnUnit = 1 / static_cast<float>(kMostPacked);
   for (int k = 0; k <= kCells; ++k) {
-    out.c_step[k] = -units.c_step * static_cast<float>(std::int32_t{curve.c_step[k]});
+    const float half = kTurnUnit * static_cast<float>(std::int32_t{curve.turn[k]}), square = half * half;
+    const float share = 1.0F / (1.0F + square);
+    out.c_step[k] = -units.c_step * ((half + half) * share);
+    out.s_step[k] = units.s_step * ((1.0F - square) * share);
   }
+  if (taper == 0) return;
+  // As yet the straight tangents have the length that the tapered ones shall have.
+  const float c_share = 1.0F / units.c_step, s_share = 1.0F / units.s_step;
   for (int k = 0; k <= kCells; ++k) {
-    out.s_step[k] = units.s_step * static_cast<float>(std::int32_t{curve.s_step[k]});
+    const float c_way =
+        c_share * (out.c_step[k] * (1.0F + taper * out.s[k]) + taper * (out.c[k] * out.s_step[k]));
+    const float s_way = s_share * out.s_step[k];
+    const float scale = 1.0F / std::sqrt(c_way * c_way + s_way * s_way);
+    out.c_step[k] *= scale;
+    out.s_step[k] *= scale;
   }
 }
 
@@ -399,12 +416,12 @@ std::uint32_t Resident::find(const PartRecord& part, const SideList& list,
 void Resident::unpack(const PartRecord& part, ShapeTable<float>& table) const noexcept {
   PackedCurve curves[2];
   std::memcpy(curves, bytes_.get() + part.curves_at, sizeof curves);
-  unpack_curve(curves[0], part.eta_units, table.eta);
-  unpack_curve(curves[1], part.omega_units, table.omega);
+  unpack_curve(curves[0], part.eta_units, part.taper, table.eta);
+  unpack_curve(curves[1], part.omega_units, 0, table.omega);
   if (part.taper != 0) {
     StoredCurve below;
     std::memcpy(&below, bytes_.get() + part.curves_at - kBelowBytes, sizeof below);
-    unpack_curve(below.packed, below.units, table.eta_below);
+    unpack_curve(below.packed, below.units, -part.taper, table.eta_below);
   }
   table.prepare(part.semi_axes, part.taper, part.rows, part.cols);
 }

@@ -8,13 +8,14 @@
 //     fan blocks | fans | part 1: ... | 4 bytes
 //
 //     curves   eta and omega as CurveTable, 16 bits a number: how far c falls and s rises over each cell
-//     (their sums
-//              then err by half a unit, and differences of neighbours, which make the second derivatives,
-//              hardly more), and the steps at the nodes
+//              (their sums then err by half a unit, and differences of neighbours, which make the second
+//              derivatives, hardly more), and how far the tangent has turned at each node: all steps are as
+//              long as an arc
 //     bounds   BoundCell[6 bound_cells^2], where the asset has bounds
 //     starts   StartTable: where layer 3 may begin, 16 bits a box
-//     rows     MapRow as 32 bits a row of the map and one more for their end: the place of its first texel,
-//              the column of that, and whether the others start inside
+//     rows     MapRow as 24 bits a row of the map and one more for their end: the place of its first texel,
+//              the column of that, and whether the others start inside. 32 bits where the map has more than
+//              65536 texels
 //     texels   `texel_bits` each, least significant bit first: the depth code and, where the part has a seam,
 //              above it the bit that the node starts inside the mesh. Of each row, round the turn, without
 //              all but the last of the longest run of nodes whose rays hit nothing and start alike; a row
@@ -48,7 +49,7 @@ struct SideList {
   std::uint32_t count{};
 };
 
-/// What one unit of the packed numbers of a curve stands for.
+/// What one unit of the packed numbers of a curve stands for, and the steps of a tangent along c or s alone.
 struct CurveUnits {
   float c{}, s{}, c_step{}, s_step{};
 };
@@ -125,7 +126,7 @@ struct PartRecord {
   std::uint8_t level_count{}, code_bits{}, texel_bits{};
   std::uint8_t bound_cells{};  ///< a side of a face; 0: no bounds
   std::uint8_t row_shift{};    ///< rows begin at multiples of 2^row_shift texels
-  bool wide_keys{};            ///< of the side lists: 32 bits, not 16
+  bool wide_keys{};            ///< of the side lists: 32 bits, not 16; of the rows: 32 bits, not 24
   std::uint32_t curves_at{}, texels_at{};
   StartTable starts;
   SideList sheets, fans;
@@ -145,11 +146,14 @@ struct PartRecord {
   float depth_of(std::uint32_t code) const noexcept {
     return depth_min + static_cast<float>(code) * depth_step;
   }
+  std::uint32_t row_word_bytes() const noexcept { return wide_keys ? 4U : 3U; }
+  /// Of four bytes that begin where the word of a row does: those that are the word's.
+  std::uint32_t row_word_mask() const noexcept { return wide_keys ? 0xFFFFFFFFU : 0xFFFFFFU; }
   /// Bytes before texels_at where the rows begin.
-  std::uint32_t row_bytes() const noexcept { return 4U * (rows + 1U); }
+  std::uint32_t row_bytes() const noexcept { return row_word_bytes() * (rows + 1U); }
   /// Of the word of a row: those of MapRow::at >> row_shift; above them that of `inside` and then `first`.
   std::uint32_t row_place_bits() const noexcept {
-    return 31U - static_cast<std::uint32_t>(std::bit_width(cols - 1U));
+    return 8U * row_word_bytes() - 1U - static_cast<std::uint32_t>(std::bit_width(cols - 1U));
   }
   std::uint32_t stride_at(std::uint32_t level) const noexcept {
     return 1U << (level < level_count ? level : level_count - 1U);
@@ -171,9 +175,9 @@ struct PartRecord {
 class Resident {
  public:
   static constexpr std::uint32_t kBlock = 8;         ///< texels a bit of a side list's blocks
-  static constexpr std::uint32_t kCurveBytes = 520;  ///< of both curves of a part
+  static constexpr std::uint32_t kCurveBytes = 388;  ///< of both curves of a part
   static constexpr std::uint32_t kBelowBytes =
-      276;  ///< before them, of a tapered part: eta below the equator
+      212;  ///< before them, of a tapered part: eta below the equator
 
   /// Precondition: a valid asset. fits() tells whether it could be held; if not, nothing is.
   explicit Resident(const Asset& asset);
@@ -198,8 +202,10 @@ class Resident {
 
   /// Precondition: index < part.rows.
   MapRow row(const PartRecord& part, std::uint32_t index) const noexcept {
-    const std::uint32_t at = part.texels_at - part.row_bytes() + 4 * index;
-    const auto word = load<std::uint32_t>(at), next = load<std::uint32_t>(at + 4);
+    const std::uint32_t size = part.row_word_bytes();
+    const std::uint32_t at = part.texels_at - part.row_bytes() + size * index;
+    const std::uint32_t word = load<std::uint32_t>(at) & part.row_word_mask();
+    const auto next = load<std::uint32_t>(at + size);
     const std::uint32_t bits = part.row_place_bits(), mask = (1U << bits) - 1U;
     return {(word & mask) << part.row_shift, word >> (bits + 1U),
             ((next & mask) - (word & mask)) << part.row_shift, (word >> bits & 1U) != 0};
