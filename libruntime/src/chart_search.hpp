@@ -51,9 +51,9 @@ inline Chart::Start Chart::start_named(const Vec3f& p, std::uint32_t stride) con
   const Vec3f straight = part_.bend.straightened(p);
   Start best;
   for (int k = 0; k < StartTable::kAround; ++k) {
-    const std::uint16_t name = resident_.start(part_, straight, k);
+    const std::uint32_t name = resident_.start(part_, straight, k);
     if (name == StartTable::kNone) continue;
-    const Start start = start_at(p, part_.starts.place(name >> 8U), part_.starts.place(name & 255U), stride);
+    const Start start = start_at(p, part_.starts.row(name), part_.starts.col(name), stride);
     if (start.square < best.square) best = start;
   }
   return best;
@@ -61,8 +61,8 @@ inline Chart::Start Chart::start_named(const Vec3f& p, std::uint32_t stride) con
 
 inline Chart::Start Chart::start_away(const Vec3f& p, float row, float col,
                                       std::uint32_t stride) const noexcept {
-  const std::uint16_t name = resident_.start(part_, part_.bend.straightened(p), StartTable::kOwn);
-  const float named_row = part_.starts.place(name >> 8U), named_col = part_.starts.place(name & 255U);
+  const std::uint32_t name = resident_.start(part_, part_.bend.straightened(p), StartTable::kOwn);
+  const float named_row = part_.starts.row(name), named_col = part_.starts.col(name);
   const float across = std::abs(col - named_col), reach = part_.starts.reach();
   const bool is_near =
       std::abs(row - named_row) <= reach && lesser(across, static_cast<float>(part_.cols) - across) <= reach;

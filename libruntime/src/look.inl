@@ -73,12 +73,18 @@ class Looker {
     };
     const VI slice = along(p.z, 2) * all_int(starts.boxes[1]) + along(p.y, 1);
     const VI box = slice * all_int(starts.boxes[0]) + along(p.x, 0);
-    const VU word = gather_bytes(resident_.bytes() + starts.at, hn::ShiftLeft<1>(box));
-    return hn::BitCast(kDI, hn::And(word, hn::Set(kDU, 0xFFFFU)));
+    const VI bit = box * all_int(StartTable::kBits);
+    const VU word = gather_bytes(resident_.bytes() + starts.at, hn::ShiftRight<3>(bit)) >>
+                    hn::And(hn::BitCast(kDU, bit), hn::Set(kDU, 7U));
+    return hn::BitCast(kDI, hn::And(word, hn::Set(kDU, StartTable::kNone)));
   }
   /// Of what Resident::start names.
-  HWY_INLINE V start_row(VI start) const noexcept { return start_place(hn::ShiftRight<8>(start)); }
-  HWY_INLINE V start_col(VI start) const noexcept { return start_place(hn::And(start, all_int(255))); }
+  HWY_INLINE V start_row(VI start) const noexcept {
+    return start_place(hn::ShiftRightSame(start, part_.starts.col_bits));
+  }
+  HWY_INLINE V start_col(VI start) const noexcept {
+    return start_place(hn::And(start, all_int((1U << part_.starts.col_bits) - 1U)));
+  }
 
   /// Whether Chart::start_away stays.
   HWY_INLINE M is_named(const V3& straight, V row, V col) const noexcept {

@@ -12,7 +12,7 @@
 //              derivatives, hardly more), and how far the tangent has turned at each node: all steps are as
 //              long as an arc
 //     bounds   BoundCell[6 bound_cells^2], where the asset has bounds
-//     starts   StartTable: where layer 3 may begin, 16 bits a box
+//     starts   StartTable: where layer 3 may begin, 12 bits a box, least significant bit first
 //     rows     MapRow as 24 bits a row of the map and one more for their end: the place of its first texel,
 //              the column of that, and whether the others start inside. 32 bits where the map has more than
 //              65536 texels
@@ -71,18 +71,20 @@ struct Slabs {
 
 /// Where a search for the nearest point of the represented surface may begin, besides the foot. The box of
 /// the superquadric is cut into boxes, each of which names the cell of the map whose patch is nearest to its
-/// middle, among those of a coarser grid, as row << 8 | column of that grid. A point asks the eight boxes
-/// around it and begins at the nearest place they name: near the medial axis one alone often names the wrong
-/// side. Filled by fill_starts() from the maps; not part of the asset.
+/// middle, among those of a coarser grid, as row << col_bits | column of that grid. A point asks the eight
+/// boxes around it and begins at the nearest place they name: near the medial axis one alone often names the
+/// wrong side. Filled by fill_starts() from the maps; not part of the asset.
 struct StartTable {
   static constexpr std::uint32_t kMostBoxes = 256;
   static constexpr int kAround = 8, kOwn = 8;
   static constexpr float kReachSteps = 1.0F;
-  static constexpr std::uint16_t kNone = 0xFFFF;  ///< the part has no patch
+  static constexpr std::uint32_t kBits = 12;     ///< of a name
+  static constexpr std::uint32_t kNone = 0xFFF;  ///< the part has no patch
 
   std::uint32_t at{};         ///< byte offset
   std::uint16_t boxes[3]{};   ///< along x, y and z; x counts fastest
   std::uint8_t step_shift{};  ///< log2 of the coarser grid's spacing [cells]
+  std::uint8_t col_bits{};
 
   static StartTable of(std::uint32_t rows, std::uint32_t cols, const Vec3f& half_extents) noexcept;
   /// Cells: places so near to one that is named are as good, for what a box knows.
@@ -91,7 +93,10 @@ struct StartTable {
   static constexpr float shift(int k, int axis) noexcept {
     return k == kOwn ? 0.0F : (k >> axis & 1) == 0 ? -0.5F : 0.5F;
   }
-  std::size_t bytes() const noexcept { return std::size_t{2} * boxes[0] * boxes[1] * boxes[2]; }
+  std::size_t bytes() const noexcept { return (std::size_t{kBits} * boxes[0] * boxes[1] * boxes[2] + 7) / 8; }
+  /// The place in the map that is named.
+  float row(std::uint32_t name) const noexcept { return place(name >> col_bits); }
+  float col(std::uint32_t name) const noexcept { return place(name & ((1U << col_bits) - 1U)); }
   /// Of a row or column of the coarser grid: that of the middle of its cell in the map.
   float place(std::uint32_t k) const noexcept {
     const std::uint32_t cell = (k << step_shift) + (1U << step_shift) / 2;
@@ -224,7 +229,7 @@ class Resident {
   }
   /// StartTable: what the k-th of the boxes around p, straight frame, names, or kNone. k = kOwn: the one p is
   /// in.
-  std::uint16_t start(const PartRecord& part, const Vec3f& p, int k) const noexcept {
+  std::uint32_t start(const PartRecord& part, const Vec3f& p, int k) const noexcept {
     const StartTable& starts = part.starts;
     std::uint32_t box = 0;
     for (int axis = 2; axis >= 0; --axis) {
@@ -233,7 +238,8 @@ class Resident {
           (p[axis] * part.inverse_extents[axis] + 1.0F) * (0.5F * count) + StartTable::shift(k, axis);
       box = box * starts.boxes[axis] + static_cast<std::uint32_t>(lesser(greater(place, 0.0F), count - 1.0F));
     }
-    return load<std::uint16_t>(starts.at + 2 * box);
+    const std::uint32_t bit = StartTable::kBits * box;
+    return load<std::uint32_t>(starts.at + bit / 8) >> (bit % 8) & StartTable::kNone;
   }
   /// Position of the first entry of a list with key >= `key`, or `count`, without a search where its block is
   /// empty.

@@ -15,13 +15,13 @@ namespace sqmap::runtime {
 
 namespace {
 
-constexpr std::uint32_t kMostCandidates = 2048;  // cells of the coarser grid
-constexpr std::uint32_t kMostSide = 255;         // of that grid, less than what kNone names
-constexpr std::uint32_t kGroupShift = 2;         // groups of 4 x 4 candidates
+// Cells of the coarser grid. So many rows and columns have names of at most 12 bits, not all of them 1.
+constexpr std::uint32_t kMostCandidates = 2048;
+constexpr std::uint32_t kGroupShift = 2;  // groups of 4 x 4 candidates
 
 struct Candidate {
   Vec3f point;
-  std::uint16_t name;
+  std::uint32_t name;
 };
 struct Group {
   Vec3f centre;
@@ -40,10 +40,9 @@ std::uint32_t side_of(std::uint32_t cells, std::uint32_t step_shift) noexcept {
 StartTable StartTable::of(std::uint32_t rows, std::uint32_t cols, const Vec3f& half_extents) noexcept {
   StartTable table;
   std::uint32_t step = 0;
-  while (side_of(rows - 1, step) * side_of(cols, step) > kMostCandidates ||
-         side_of(rows - 1, step) > kMostSide || side_of(cols, step) > kMostSide)
-    ++step;
+  while (std::size_t{side_of(rows - 1, step)} * side_of(cols, step) > kMostCandidates) ++step;
   table.step_shift = static_cast<std::uint8_t>(step);
+  table.col_bits = static_cast<std::uint8_t>(std::bit_width(side_of(cols, step) - 1));
   // Cubes, as nearly as their number allows: shortest side first, the others share what it leaves.
   int order[] = {0, 1, 2};
   std::stable_sort(std::begin(order), std::end(order),
@@ -79,7 +78,7 @@ void Resident::fill_starts(const PartRecord& part) {
         for (std::uint32_t c = col; c < std::min(col + side, cols); ++c) {
           Vec3f point;
           if (chart.patch_point(starts.place(r), starts.place(c), point))
-            candidates.push_back({point, static_cast<std::uint16_t>(r << 8U | c)});
+            candidates.push_back({point, r << starts.col_bits | c});
         }
       }
       group.end = static_cast<std::uint32_t>(candidates.size());
@@ -95,14 +94,14 @@ void Resident::fill_starts(const PartRecord& part) {
   if (groups.empty()) return;
 
   std::vector<float> distance(groups.size());
-  std::uint8_t* out = bytes_.get() + starts.at;
+  std::uint32_t bit = 0;
   const auto middle = [&](std::uint32_t k, int axis) {
     const float share = (static_cast<float>(k) + 0.5F) / static_cast<float>(starts.boxes[axis]);
     return (2 * share - 1) / part.inverse_extents[axis];
   };
   for (std::uint32_t z = 0; z < starts.boxes[2]; ++z) {
     for (std::uint32_t y = 0; y < starts.boxes[1]; ++y) {
-      for (std::uint32_t x = 0; x < starts.boxes[0]; ++x, out += 2) {
+      for (std::uint32_t x = 0; x < starts.boxes[0]; ++x, bit += StartTable::kBits) {
         const Vec3f p = chart.to_part({middle(x, 0), middle(y, 1), middle(z, 2)});
         for (std::size_t g = 0; g < groups.size(); ++g) distance[g] = norm(groups[g].centre - p);
         const auto closest = std::min_element(distance.begin(), distance.end()) - distance.begin();
@@ -119,7 +118,11 @@ void Resident::fill_starts(const PartRecord& part) {
         consider(groups[static_cast<std::size_t>(closest)]);
         for (std::size_t g = 0; g < groups.size(); ++g)
           if (distance[g] - groups[g].radius < nearest) consider(groups[g]);
-        std::memcpy(out, &best.name, sizeof best.name);
+        // All ones as yet.
+        std::uint8_t* out = bytes_.get() + starts.at + bit / 8;
+        const std::uint32_t held = (best.name ^ StartTable::kNone) << (bit % 8);
+        out[0] = static_cast<std::uint8_t>(out[0] ^ held);
+        out[1] = static_cast<std::uint8_t>(out[1] ^ (held >> 8U));
       }
     }
   }

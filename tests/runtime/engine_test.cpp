@@ -442,8 +442,8 @@ TEST(Resident, TakesTheBytesItsFormulaSays) {
       bytes += (held * (part.map.bits + (seam ? 1U : 0U)) + 7) / 8;
       if (part.shape.taper != 0) bytes += 212;
       const std::size_t starts = resident.part(k).starts.bytes();
-      EXPECT_GT(starts, 2 * 180U);
-      EXPECT_LE(starts, 2 * 256U);
+      EXPECT_GT(starts, 3 * 180U / 2);
+      EXPECT_LE(starts, 3 * 256U / 2);
       bytes += starts;
       const std::size_t blocks = (texels + 63) / 64;
       if (!part.map.crossings.empty()) bytes += blocks + 4 * part.map.crossings.size();

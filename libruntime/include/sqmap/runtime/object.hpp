@@ -150,7 +150,8 @@ class Object {
   /// Memory the object holds, itself included. With r rows, n texels of b bits that are held, c further
   /// crossings and v vertex samples in a part, of which the baker's parts have about one a hundred texels:
   ///
-  ///     constant + sum over parts of  record + 388 + u (r + 1) + ceil(n (b + s) / 8) + 2 t + 36 m^2
+  ///     constant + sum over parts of  record + 388 + u (r + 1) + ceil(n (b + s) / 8) + ceil(3 t / 2) + 36
+  ///     m^2
   ///                                   + [c > 0] (ceil(r k / 64) + (2 + w) c)
   ///                                   + [v > 0] (ceil(r k / 64) + (4 + w) v)
   ///
