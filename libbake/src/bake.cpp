@@ -205,13 +205,15 @@ std::vector<std::vector<PlacedShape>> shapes_of(const Asset& asset, const std::v
   return shapes;
 }
 
-/// The maps of the parts' first shapes; or of any, where those meet the target as well in fewer bytes.
+/// The maps of the parts' first shapes; or of any, where those meet the target as well in fewer bytes. Uses
+/// what is `traced`, and leaves there what was.
 Result<Drawn> draw_smallest(Asset& asset, const std::vector<Piece>& pieces,
                             const std::vector<double>& areas_m2, const MeshQueries& queries,
-                            const MapTarget& target, std::uint64_t seed) {
+                            const MapTarget& target, std::uint64_t seed, TracedShapes& traced) {
   const std::vector<std::vector<PlacedShape>> shapes = shapes_of(asset, pieces);
-  MapDrawer drawer(shapes, areas_m2, queries);
+  MapDrawer drawer(shapes, areas_m2, queries, std::move(traced));
   auto drawn = draw_maps(asset, drawer, 1, queries, target, kSmallEnough, seed);
+  traced = drawer.traced();
   const bool have_others =
       std::any_of(shapes.begin(), shapes.end(), [](const auto& s) { return s.size() > 1; });
   if (!drawn || !have_others) return drawn;
@@ -219,6 +221,7 @@ Result<Drawn> draw_smallest(Asset& asset, const std::vector<Piece>& pieces,
   // Tapers and bends are to save memory, but not at the price of what exactness small objects have.
   const std::size_t fewer = std::clamp(drawn.value().bytes, kSmallEnough / 2, kSmallEnough);
   auto redrawn = draw_maps(other, drawer, kAllShapes, queries, target, fewer, seed);
+  traced = drawer.traced();
   if (!redrawn) return redrawn;
   const Drawn &rigid = drawn.value(), &formed = redrawn.value();
   const bool meets = formed.depth_in_aims <= std::max(rigid.depth_in_aims, kAtAims);
@@ -238,14 +241,13 @@ struct DrawnPartition {
   Drawn drawn;
 
   bool may_be_smaller() const { return stopped_by == "target" && drawn.bytes > kSmallEnough; }
-  /// Fewer bytes, those that more parts cost in time counted, and no more error than there may be.
+  double part_bytes() const { return kPartTimeBytes * static_cast<double>(asset.parts.size()); }
+  /// Bytes, and those that more parts cost in time.
+  double cost() const { return static_cast<double>(drawn.bytes) + part_bytes(); }
+  /// Costs less, and errs no more than it may.
   bool is_better_than(const DrawnPartition& other) const {
-    const auto cost = [](const DrawnPartition& p) {
-      return static_cast<double>(p.drawn.bytes) + kPartTimeBytes * static_cast<double>(p.asset.parts.size());
-    };
     return stopped_by == "target" &&
-           drawn.worst_in_aims() <= std::max(kAtAims, other.drawn.worst_in_aims()) &&
-           cost(*this) < cost(other);
+           drawn.worst_in_aims() <= std::max(kAtAims, other.drawn.worst_in_aims()) && cost() < other.cost();
   }
 };
 
@@ -257,8 +259,10 @@ struct PartitionDrawer {
   double r_max_m;
   std::uint32_t source_faces;
   const BakeOptions& options;
+  TracedShapes traced;  ///< for the last partition: others have many of its parts
 
-  Result<DrawnPartition> draw(Refinement refinement) const {
+  /// Gives up where that takes more than it costs to keep `rival`, which meets its aims.
+  Result<DrawnPartition> draw(Refinement refinement, const DrawnPartition* rival = nullptr) {
     std::vector<Piece>& pieces = refinement.pieces;
     sort_pieces(pieces);
     DrawnPartition result{{}, {}, std::move(refinement.stopped_by), {}};
@@ -271,14 +275,17 @@ struct PartitionDrawer {
     const std::vector<std::uint16_t> owner = owners(pieces, fine, mesh.faces.size());
     count_members(asset.parts, mesh, owner);
     asset.face_labels = label_input_faces(owner, mesh, source_faces);
-    const MapTarget target{options.max_error_percent / 100 * r_max_m, options.max_bytes};
+    MapTarget target{options.max_error_percent / 100 * r_max_m, options.max_bytes};
+    if (rival != nullptr && rival->drawn.worst_in_aims() <= kAtAims)
+      target.most_held = static_cast<std::size_t>(std::max(0.0, rival->cost() - result.part_bytes()));
     std::vector<double> areas_m2;
     for (const Piece& piece : pieces) areas_m2.push_back(piece.area_m2);
-    auto drawn = draw_smallest(asset, pieces, areas_m2, queries, target, options.seed);
+    auto drawn = draw_smallest(asset, pieces, areas_m2, queries, target, options.seed, traced);
     if (!drawn) return drawn.error();
-    if (result.stopped_by == "target" && !drawn.value().by_budget && drawn.value().depth_in_aims > kAtAims) {
+    if (result.stopped_by == "target" && !drawn.value().by_budget && drawn.value().depth_in_aims > kAtAims &&
+        drawn.value().bytes <= target.most_held) {
       Asset quick = with_quick_fits(asset, pieces);
-      auto redrawn = draw_smallest(quick, pieces, areas_m2, queries, target, options.seed);
+      auto redrawn = draw_smallest(quick, pieces, areas_m2, queries, target, options.seed, traced);
       if (!redrawn) return redrawn.error();
       if (redrawn.value().depth_in_aims < drawn.value().depth_in_aims) {
         asset.parts = std::move(quick.parts);
@@ -290,6 +297,8 @@ struct PartitionDrawer {
     for (std::size_t k = 0; k < pieces.size(); ++k)
       for (const FittedPart& other : pieces[k].others)
         if (other.part.shape == asset.parts[k].shape) result.fits[k] = other.fit;
+    // What the drafts foretold may be wrong.
+    if (drawn.value().worst_in_aims() <= kAtAims) result.stopped_by = "target";
     if (drawn.value().by_budget) result.stopped_by = "bytes";
     result.drawn = drawn.value();
     return result;
@@ -356,7 +365,7 @@ Result<BakeResult> bake(const SourceMesh& source, const BakeOptions& asked, cons
   PartitionSearch partitions(set, {fine, rays, oracle, open}, r_max_m, options);
   auto refined = partitions.best(close_segments(set, whole, fine_segments), progress);
   if (!refined) return refined.error();
-  const PartitionDrawer drawer{prepared.mesh, fine, queries, r_max_m, source.source_face_count, options};
+  PartitionDrawer drawer{prepared.mesh, fine, queries, r_max_m, source.source_face_count, options, {}};
   stages.begin("map");
   auto baked = drawer.draw(std::move(refined).value());
   while (baked && baked.value().may_be_smaller()) {
@@ -366,7 +375,7 @@ Result<BakeResult> bake(const SourceMesh& source, const BakeOptions& asked, cons
     if (!other) return other.error();
     if (!other.value()) break;
     stages.begin("map");
-    auto redrawn = drawer.draw(std::move(*other.value()));
+    auto redrawn = drawer.draw(std::move(*other.value()), &baked.value());
     if (!redrawn) return redrawn.error();
     if (redrawn.value().is_better_than(baked.value())) baked = std::move(redrawn);
   }

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
-#include <optional>
+#include <utility>
 
 #include <tbb/parallel_for.h>
 
@@ -45,17 +45,31 @@ struct Strided {
   double error_m;  ///< what it loses, the other direction kept as it is
 };
 
-/// A traced shape of a part with what coarser maps of it would lose. The losses of both directions add.
-struct Candidate {
+}  // namespace
+
+/// With what coarser maps of it would lose. The losses of both directions add.
+struct TracedShape {
   PlacedShape placed;
-  Quadrant wanted;
-  std::optional<Quadrant> cells;  ///< of the field; empty: not yet traced
+  Quadrant cells;  ///< of the field
   RayField field;
   std::vector<Strided> rows, cols;
   double own_error_m{};  ///< of the field itself, foretold from its coarser halves
   double deepest_m{}, hit_share{};
   double held_share{};  ///< of the texels, those that a loaded object holds
   bool has_seam{};
+};
+
+namespace {
+
+/// A shape that a part may have.
+struct Candidate {
+  PlacedShape placed;
+  Quadrant wanted;
+  std::shared_ptr<const TracedShape> traced;
+
+  bool is_traced_in(const std::shared_ptr<const TracedShape>& other) const {
+    return other && other->cells == wanted && other->placed == placed;
+  }
 };
 
 struct Choice {
@@ -77,10 +91,9 @@ std::vector<Strided> strides(std::uint32_t quadrant_cells, ErrorAt error_at) {
   return out;
 }
 
-Candidate trace(const PlacedShape& placed, const MeshQueries& queries, const Quadrant& cells) {
-  Candidate candidate;
+TracedShape trace(const PlacedShape& placed, const MeshQueries& queries, const Quadrant& cells) {
+  TracedShape candidate;
   candidate.placed = placed;
-  candidate.wanted = cells;
   candidate.cells = cells;
   const std::uint32_t rows = 2 * cells.rows + 1, cols = 4 * cells.cols;
   candidate.field = trace_map(placed.shape, placed.object_from_part, rows, cols, queries);
@@ -142,12 +155,12 @@ class Allotment {
   double stored_bytes(const std::vector<Choice>& choices) const {
     double sum = 0;
     for (std::size_t k = 0; k < choices.size(); ++k) {
-      const Candidate& candidate = candidates_[k][choices[k].candidate];
+      const TracedShape& candidate = *candidates_[k][choices[k].candidate].traced;
       sum += kStoredShare * candidate.hit_share * choices[k].texels * bits(candidate) / 8;
     }
     return sum;
   }
-  std::uint32_t bits(const Candidate& candidate) const {
+  std::uint32_t bits(const TracedShape& candidate) const {
     const double codes = candidate.deepest_m / (kStepShare * target_m_) + 2;
     return static_cast<std::uint32_t>(std::clamp(std::ceil(std::log2(codes)), 4.0, double(kMostBits)));
   }
@@ -168,7 +181,7 @@ class Allotment {
     Choice best;
     double least = std::numeric_limits<double>::infinity();
     for (std::size_t k = 0; k < std::min(candidates.size(), most_shapes_); ++k) {
-      const Candidate& candidate = candidates[k];
+      const TracedShape& candidate = *candidates[k].traced;
       const bool held_only = cost_ == TexelCost::kHeld;
       const double texel_bits = held_only
                                     ? candidate.held_share * (bits(candidate) + (candidate.has_seam ? 1 : 0))
@@ -178,8 +191,8 @@ class Allotment {
         for (std::size_t c = 0; c < candidate.cols.size(); ++c) {
           const Strided &row = candidate.rows[r], &col = candidate.cols[c];
           const double error_m = row.error_m + col.error_m + candidate.own_error_m;
-          const double rows = 2.0 * candidate.cells->rows / row.stride + 1;
-          const double texels = rows * 4.0 * candidate.cells->cols / col.stride;
+          const double rows = 2.0 * candidate.cells.rows / row.stride + 1;
+          const double texels = rows * 4.0 * candidate.cells.cols / col.stride;
           const double bytes = row_bytes * rows + texels * texel_bits / 8;
           const double cost = weight * error_m + price * bytes;
           if (cost < least) {
@@ -214,15 +227,22 @@ struct MapDrawer::Impl {
   const MeshQueries& queries;
   std::vector<double> weights;  ///< sum 1
   Candidates candidates;
+  TracedShapes known, used;
 
   void trace_wanted(std::size_t most_shapes) {
-    tbb::parallel_for(std::size_t{0}, candidates.size(), [&](std::size_t k) {
-      for (std::size_t i = 0; i < std::min(candidates[k].size(), most_shapes); ++i) {
-        Candidate& candidate = candidates[k][i];
-        if (candidate.cells != candidate.wanted)
-          candidate = trace(candidate.placed, queries, candidate.wanted);
-      }
+    std::vector<Candidate*> wanted;
+    for (std::vector<Candidate>& of_part : candidates)
+      for (std::size_t i = 0; i < std::min(of_part.size(), most_shapes); ++i)
+        if (!of_part[i].is_traced_in(of_part[i].traced)) wanted.push_back(&of_part[i]);
+    tbb::parallel_for(std::size_t{0}, wanted.size(), [&](std::size_t i) {
+      Candidate& candidate = *wanted[i];
+      const auto here = std::ranges::find_if(known, [&](const auto& t) { return candidate.is_traced_in(t); });
+      candidate.traced =
+          here != known.end()
+              ? *here
+              : std::make_shared<const TracedShape>(trace(candidate.placed, queries, candidate.wanted));
     });
+    for (const Candidate* candidate : wanted) used.push_back(candidate->traced);
   }
 
   /// Where a direction of a field is taken as it is, a finer one might be worth its bytes.
@@ -243,8 +263,8 @@ struct MapDrawer::Impl {
 };
 
 MapDrawer::MapDrawer(const std::vector<std::vector<PlacedShape>>& shapes, const std::vector<double>& area_m2,
-                     const MeshQueries& queries)
-    : impl_(std::make_unique<Impl>(Impl{queries, {}, {}})) {
+                     const MeshQueries& queries, TracedShapes known)
+    : impl_(std::make_unique<Impl>(Impl{queries, {}, {}, std::move(known), {}})) {
   const double total_m2 = std::accumulate(area_m2.begin(), area_m2.end(), 0.0);
   for (const double a : area_m2) impl_->weights.push_back(a / total_m2);
   for (const std::vector<PlacedShape>& of_part : shapes) {
@@ -254,6 +274,8 @@ MapDrawer::MapDrawer(const std::vector<std::vector<PlacedShape>>& shapes, const 
 }
 
 MapDrawer::~MapDrawer() = default;
+
+const TracedShapes& MapDrawer::traced() const { return impl_->used; }
 
 bool MapDrawer::draw(std::vector<Part>& parts, const MapTarget& target, std::size_t most_shapes,
                      TexelCost cost) {
@@ -274,7 +296,7 @@ bool MapDrawer::draw(std::vector<Part>& parts, const MapTarget& target, std::siz
     if (by_budget) choices = allotment.at(allotment.price_where(in_budget, false));
   } while (impl_->want_finer(choices));
   tbb::parallel_for(std::size_t{0}, parts.size(), [&](std::size_t k) {
-    const Candidate& c = candidates[k][choices[k].candidate];
+    const TracedShape& c = *candidates[k][choices[k].candidate].traced;
     parts[k].shape = c.placed.shape;
     parts[k].object_from_part = c.placed.object_from_part;
     parts[k].sphere = sphere_of(c.placed.shape, c.placed.object_from_part);
@@ -287,13 +309,13 @@ bool MapDrawer::draw(std::vector<Part>& parts, const MapTarget& target, std::siz
 std::vector<DistanceMap> MapDrawer::finer(std::size_t k, const Part& part) const {
   std::vector<DistanceMap> maps;
   const auto has_drawn = [&](const Candidate& c) {
-    return c.cells && c.placed.shape == part.shape && c.placed.object_from_part == part.object_from_part &&
-           (c.field.rows - 1) % (part.map.rows - 1) == 0 && c.field.cols % part.map.cols == 0;
+    return c.traced && c.placed.shape == part.shape && c.placed.object_from_part == part.object_from_part &&
+           (c.traced->field.rows - 1) % (part.map.rows - 1) == 0 && c.traced->field.cols % part.map.cols == 0;
   };
   const auto& candidates = impl_->candidates[k];
   const auto candidate = std::ranges::find_if(candidates, has_drawn);
   if (candidate == candidates.end()) return maps;
-  const RayField& field = candidate->field;
+  const RayField& field = candidate->traced->field;
   const std::uint32_t row_stride = (field.rows - 1) / (part.map.rows - 1);
   const std::uint32_t col_stride = field.cols / part.map.cols;
   // Strides ascend.
@@ -303,8 +325,8 @@ std::vector<DistanceMap> MapDrawer::finer(std::size_t k, const Part& part) const
       if (s.stride < stride) below = s.stride;
     return below;
   };
-  const std::uint32_t finer_rows = next(candidate->rows, row_stride);
-  const std::uint32_t finer_cols = next(candidate->cols, col_stride);
+  const std::uint32_t finer_rows = next(candidate->traced->rows, row_stride);
+  const std::uint32_t finer_cols = next(candidate->traced->cols, col_stride);
   if (finer_rows < row_stride) maps.push_back(quantise(field, {finer_rows, col_stride, part.map.bits}));
   if (finer_cols < col_stride) maps.push_back(quantise(field, {row_stride, finer_cols, part.map.bits}));
   if (part.map.bits < kMostBits) maps.push_back(quantise(field, {row_stride, col_stride, part.map.bits + 1}));

@@ -16,6 +16,7 @@ namespace sqmap::bake {
 struct PlacedShape {
   Superquadric shape;
   Pose object_from_part;
+  bool operator==(const PlacedShape&) const = default;
 };
 
 /// For MapDrawer::draw.
@@ -25,6 +26,8 @@ inline constexpr auto kAllShapes = std::numeric_limits<std::size_t>::max();
 struct MapTarget {
   double error_m;           ///< mean error over the object's surface
   std::uint64_t max_bytes;  ///< of all maps in the file, about
+  /// Of the object in memory: of no use if it takes more.
+  std::size_t most_held = std::numeric_limits<std::size_t>::max();
 };
 
 /// Which texels of a map count: all, or those that a loaded object holds (libruntime/src/resident.hpp), with
@@ -34,13 +37,17 @@ enum class TexelCost { kAll, kHeld };
 /// Of the maps in a file, about.
 double stored_bytes(const std::vector<Part>& parts);
 
+/// What rays met of a shape.
+struct TracedShape;
+using TracedShapes = std::vector<std::shared_ptr<const TracedShape>>;
+
 /// Draws the maps of all parts of an asset, for one target after the other: what rays met is kept.
 class MapDrawer {
  public:
   /// shapes[k]: the superquadrics, each with its pose, that part k may have, at least one. It counts by its
-  /// `area_m2` of the mesh.
+  /// `area_m2` of the mesh. `known`: what is traced already, of the same mesh.
   MapDrawer(const std::vector<std::vector<PlacedShape>>& shapes, const std::vector<double>& area_m2,
-            const MeshQueries& queries);
+            const MeshQueries& queries, TracedShapes known = {});
   ~MapDrawer();
   MapDrawer(MapDrawer&&) = delete;
 
@@ -53,6 +60,9 @@ class MapDrawer {
   /// The next finer maps that rays are at hand for, of a part with a map that draw() gave part k: in rows, in
   /// columns, in bits.
   std::vector<DistanceMap> finer(std::size_t k, const Part& part) const;
+
+  /// All that was traced or, being known, used.
+  const TracedShapes& traced() const;
 
  private:
   struct Impl;

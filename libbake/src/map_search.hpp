@@ -31,7 +31,8 @@ struct Drawn {
 /// Maps that meet the aims and, in an object of more than `small_enough` bytes, no finer ones than that
 /// takes, by drawing them for stricter and looser targets than is asked. What they lose beside seams, where
 /// one chart ends and the next has not begun, shows only between parts, so each drawing is judged as a whole.
-/// Where finer maps do not lower the error enough, the last that did, and single ones of them finer.
+/// Where finer maps do not lower the error enough, the last that did, and single ones of them finer. Gives up
+/// once an object of more than target.most_held bytes misses the aims.
 /// `most_shapes`: as of MapDrawer::draw. Errors: those of runtime::Object::build.
 Result<Drawn> draw_maps(Asset& asset, MapDrawer& drawer, std::size_t most_shapes, const MeshQueries& queries,
                         const MapTarget& target, std::size_t small_enough, std::uint64_t seed);

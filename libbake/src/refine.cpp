@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <memory>
 #include <numeric>
 #include <optional>
 #include <tuple>
@@ -48,6 +49,8 @@ constexpr int kMostTrials = 4;
 // Of those that only save bytes: the least share they must save, and how many in a row may not.
 constexpr double kWorthSaving = 0.01;
 constexpr int kMostVainSplits = 8;
+// Of the partitions on the way to the last, so many are offered, their counts of parts in equal ratios.
+constexpr std::size_t kMostOnTheWay = 8;
 
 /// Of the texels of a map, those that a loaded object holds.
 double held_share(const DistanceMap& map) {
@@ -72,42 +75,74 @@ Result<Piece> draft_piece(const SolidSet& set, Cell cell, const MeshQueries& que
   return piece;
 }
 
-/// Gives every piece the fit it deserves.
-Outcome fit_pieces(const SolidSet& set, std::vector<Piece>& pieces, const FitOptions& options) {
-  std::vector<std::optional<Error>> errors(pieces.size());
+/// The full fits of a solid.
+struct FullFits {
+  std::vector<Vec3d> corners_m;  ///< of the solid's triangles
+  FittedPart rigid;
+  std::vector<FittedPart> others;
+};
+
+Result<FullFits> fit_fully(const SolidSet& set, const Solid& solid, std::vector<Vec3d> corners_m,
+                           const FitOptions& options) {
   FitOptions rigid = options;
   rigid.taper = false;
+  auto fitted = fit_part(set, solid, rigid);
+  if (!fitted) return fitted.error();
+  FullFits fits{std::move(corners_m), std::move(fitted).value(), {}};
+  if (options.taper) {
+    if (auto tapered = fit_part(set, solid, options)) fits.others.push_back(std::move(tapered).value());
+  }
+  if (options.bend) {
+    if (auto bent = bend_part(set, solid, fits.rigid, options)) fits.others.push_back(std::move(*bent));
+  }
+  return fits;
+}
+
+/// Gives every piece the fit it deserves. `known`: those of the last partition; then of this one.
+Outcome fit_pieces(const SolidSet& set, std::vector<Piece>& pieces, const FitOptions& options,
+                   std::vector<std::shared_ptr<const FullFits>>& known) {
+  std::vector<std::optional<Error>> errors(pieces.size());
+  std::vector<std::shared_ptr<const FullFits>> fits(pieces.size());
   tbb::parallel_for(std::size_t{0}, pieces.size(), [&](std::size_t k) {
-    if (options.taper) {
-      if (auto tapered = fit_part(set, pieces[k].held, options))
-        pieces[k].others.push_back(std::move(tapered).value());
-    }
-    auto fitted = fit_part(set, pieces[k].held, rigid);
-    if (options.bend && fitted) {
-      if (auto bent = bend_part(set, pieces[k].held, fitted.value(), options))
-        pieces[k].others.push_back(std::move(*bent));
-    }
-    if (fitted) {
-      pieces[k].quick = FittedPart{std::move(pieces[k].part), pieces[k].fit};
-      pieces[k].quick->part.map = {};
-      pieces[k].part = std::move(fitted.value().part);
-      pieces[k].quick->part.volume_m3 = pieces[k].part.volume_m3;  // of the same solid
-      pieces[k].fit = fitted.value().fit;
-      pieces[k].label();
+    Piece& piece = pieces[k];
+    std::vector<Vec3d> corners_m;
+    for (const auto& triangle : piece.held.triangles)
+      for (const std::uint32_t v : triangle) corners_m.push_back(set.vertices_m[v]);
+    const auto same =
+        std::ranges::find_if(known, [&](const auto& fit) { return fit->corners_m == corners_m; });
+    if (same != known.end()) {
+      fits[k] = *same;
     } else {
-      errors[k] = fitted.error();
+      auto fitted = fit_fully(set, piece.held, std::move(corners_m), options);
+      if (!fitted) {
+        errors[k] = fitted.error();
+        return;
+      }
+      fits[k] = std::make_shared<const FullFits>(std::move(fitted).value());
     }
+    piece.quick = FittedPart{std::move(piece.part), piece.fit};
+    piece.quick->part.map = {};
+    piece.part = fits[k]->rigid.part;
+    piece.fit = fits[k]->rigid.fit;
+    piece.others = fits[k]->others;
+    piece.quick->part.volume_m3 = piece.part.volume_m3;  // of the same solid
+    piece.label();
   });
   for (const auto& error : errors) {
     if (error) return *error;
   }
+  known = std::move(fits);
   return Done{};
 }
 
-std::vector<std::uint32_t> part_of_face(const std::vector<Piece>& pieces, std::size_t face_count) {
+/// Pieces of partitions, each once: those of neighbours on the way differ in few. Of a piece that is shared
+/// only the cuts are ever set.
+using SharedPieces = std::vector<std::shared_ptr<Piece>>;
+
+std::vector<std::uint32_t> part_of_face(const SharedPieces& pieces, std::size_t face_count) {
   std::vector<std::uint32_t> owner(face_count, 0);
   for (std::uint32_t k = 0; k < pieces.size(); ++k) {
-    for (const std::uint32_t face : pieces[k].cell.solid.face) {
+    for (const std::uint32_t face : pieces[k]->cell.solid.face) {
       if (face != kNewFace) owner[face] = k;
     }
   }
@@ -115,11 +150,11 @@ std::vector<std::uint32_t> part_of_face(const std::vector<Piece>& pieces, std::s
 }
 
 /// Error that each part adds to the sum over the shell [m].
-Result<std::vector<double>> judge(const std::vector<Piece>& pieces, const ShellPoints& shell,
+Result<std::vector<double>> judge(const SharedPieces& pieces, const ShellPoints& shell,
                                   std::size_t face_count, double r_max_m) {
   Asset asset;
   asset.r_max_m = r_max_m;
-  for (const Piece& piece : pieces) asset.parts.push_back(piece.part);
+  for (const auto& piece : pieces) asset.parts.push_back(piece->part);
   asset.sphere = enclosing_sphere(asset.parts);
   auto object = runtime::Object::build(asset);
   if (!object) return object.error();
@@ -169,7 +204,7 @@ class Refiner {
     tbb::parallel_for(std::size_t{0}, cells.size(), [&](std::size_t k) {
       auto piece = draft_piece(set_, std::move(cells[k]), queries_, options_.fit);
       if (piece) {
-        pieces[k] = std::move(piece).value();
+        pieces[k] = std::make_shared<Piece>(std::move(piece).value());
       } else {
         errors[k] = piece.error();
       }
@@ -190,16 +225,17 @@ class Refiner {
     const std::optional<std::size_t> worst =
         worst_of(kWorthSplitting * price_m(), [&](Piece& piece) { return can_split(piece); });
     if (!worst) return false;
-    Piece before = pieces[*worst];
+    const auto before = std::make_shared<Piece>(*pieces[*worst]);
     const std::vector<double> error_before_m = error_m_;
     const double sum_before_m = error_m();
-    if (auto outcome = split(*worst, before.cuts_tried); !outcome) return outcome.error();
+    if (auto outcome = split(*worst, before->cuts_tried); !outcome) return outcome.error();
     const double saved_m = sum_before_m - error_m();
     if (saved_m > price_m()) return true;
     // The whole piece comes back; the next best cut across it will be tried.
-    if (!before.spare || -saved_m < before.spare->loss_m) before.spare = Spare{before.cuts_tried, -saved_m};
-    ++before.cuts_tried;
-    pieces[*worst] = std::move(before);
+    if (!before->spare || -saved_m < before->spare->loss_m)
+      before->spare = Spare{before->cuts_tried, -saved_m};
+    ++before->cuts_tried;
+    pieces[*worst] = before;
     pieces.pop_back();
     error_m_ = error_before_m;
     return true;
@@ -213,7 +249,7 @@ class Refiner {
         worst_of(0, [](Piece& piece) { return piece.spare.has_value(); });
     if (!worst) return false;
     ++trials_;
-    if (auto outcome = split(*worst, pieces[*worst].spare->cut); !outcome) return outcome.error();
+    if (auto outcome = split(*worst, pieces[*worst]->spare->cut); !outcome) return outcome.error();
     return true;
   }
 
@@ -224,17 +260,17 @@ class Refiner {
     if (trials_ == kMostVainSplits) return false;
     const std::optional<std::size_t> worst = worst_of(0, [&](Piece& piece) { return can_split(piece); });
     if (!worst) return false;
-    Piece before = pieces[*worst];
+    const auto before = std::make_shared<Piece>(*pieces[*worst]);
     const std::vector<double> error_before_m = error_m_;
     const double cost_before = cost(kPartBytes);
-    if (auto outcome = split(*worst, before.cuts_tried); !outcome) return outcome.error();
+    if (auto outcome = split(*worst, before->cuts_tried); !outcome) return outcome.error();
     if (cost(kPartBytes) < (1 - kWorthSaving) * cost_before) {
       trials_ = 0;
       return true;
     }
     ++trials_;
-    ++before.cuts_tried;
-    pieces[*worst] = std::move(before);
+    ++before->cuts_tried;
+    pieces[*worst] = before;
     pieces.pop_back();
     error_m_ = error_before_m;
     return true;
@@ -246,6 +282,8 @@ class Refiner {
       best = {pieces, error_m_, cost_now};
       return true;
     };
+    if (on_the_way_.empty() || on_the_way_.back().pieces.size() != pieces.size())
+      on_the_way_.push_back({pieces, error_m_, 0});
     if (remember(best_, cost(kBestPartBytes))) trials_ = 0;
     if (is_within_target()) remember(smallest_, bytes(kPartBytes));
   }
@@ -262,14 +300,35 @@ class Refiner {
     return true;
   }
   void go_to_best() { go_to(best_); }
+  /// Goes to the next of those on the way that are offered. False: there is none left.
+  bool go_to_next_on_the_way() {
+    if (on_the_way_.empty()) return false;
+    const auto least = static_cast<double>(on_the_way_.front().pieces.size());
+    const auto most = static_cast<double>(on_the_way_.back().pieces.size());
+    for (; next_ < kMostOnTheWay; ++next_) {
+      const double share = 1 - static_cast<double>(next_) / (kMostOnTheWay - 1);
+      const double parts = least * std::pow(most / least, share);
+      const auto nearest = std::ranges::min_element(on_the_way_, {}, [&](const Snapshot& s) {
+        return std::abs(static_cast<double>(s.pieces.size()) - parts);
+      });
+      if (nearest->is_used || nearest->pieces.size() == best_.pieces.size() ||
+          nearest->pieces.size() == smallest_.pieces.size())
+        continue;
+      nearest->is_used = true;
+      go_to(*nearest);
+      return true;
+    }
+    return false;
+  }
 
-  std::vector<Piece> pieces;
+  SharedPieces pieces;
 
  private:
   struct Snapshot {
-    std::vector<Piece> pieces;
+    SharedPieces pieces;
     std::vector<double> error_m;
     double cost{};
+    bool is_used = false;
   };
 
   void go_to(const Snapshot& snapshot) {
@@ -284,9 +343,9 @@ class Refiner {
   /// (sum (w_k e_k)^(2/3) h_k^(1/3))^3 / T^2 times those of that resolution.
   double bytes(double part_bytes) const {
     double sum = 0, all_m2 = 0;
-    for (const Piece& piece : pieces) {
-      sum += std::cbrt(std::pow(piece.area_m2 * piece.loss_m, 2) * piece.held_share);
-      all_m2 += piece.area_m2;
+    for (const auto& piece : pieces) {
+      sum += std::cbrt(std::pow(piece->area_m2 * piece->loss_m, 2) * piece->held_share);
+      all_m2 += piece->area_m2;
     }
     const double mean_m = options_.max_error_percent / 100 * r_max_m_;
     const double drafts = std::pow(sum, 3) / std::pow(all_m2 * mean_m, 2);
@@ -316,8 +375,8 @@ class Refiner {
   /// What each piece has of the error and of the volume beside the mesh (kVolumeShare).
   std::vector<double> burdens() const {
     std::vector<double> beside_m3;
-    for (const Piece& piece : pieces)
-      beside_m3.push_back(std::max(0.0, volume_m3(piece.part.shape) - piece.part.volume_m3));
+    for (const auto& piece : pieces)
+      beside_m3.push_back(std::max(0.0, volume_m3(piece->part.shape) - piece->part.volume_m3));
     const double all_m3 = std::accumulate(beside_m3.begin(), beside_m3.end(), 0.0), all_m = error_m();
     std::vector<double> burden(pieces.size());
     for (std::size_t k = 0; k < burden.size(); ++k)
@@ -335,22 +394,22 @@ class Refiner {
     std::stable_sort(order.begin(), order.end(),
                      [&](std::size_t a, std::size_t b) { return burden[a] > burden[b]; });
     for (const std::size_t k : order)
-      if (error_m_[k] > least_m && may(pieces[k])) return k;
+      if (error_m_[k] > least_m && may(*pieces[k])) return k;
     return std::nullopt;
   }
 
   /// Puts the halves of piece k in its place and at the end.
   Outcome split(std::size_t k, std::size_t which) {
-    const Cell& whole = pieces[k].cell;
+    const Cell& whole = pieces[k]->cell;
     Cell first{{}, whole.segment, CutReason::kErrorTarget}, second = first;
-    std::tie(first.solid, second.solid) = set_.split(whole.solid, (*pieces[k].cuts)[which]);
+    std::tie(first.solid, second.solid) = set_.split(whole.solid, (*pieces[k]->cuts)[which]);
     std::optional<Result<Piece>> a, b;
     tbb::parallel_invoke([&] { a = draft_piece(set_, std::move(first), queries_, options_.fit); },
                          [&] { b = draft_piece(set_, std::move(second), queries_, options_.fit); });
     if (!*a) return a->error();
     if (!*b) return b->error();
-    pieces[k] = std::move(*a).value();
-    pieces.push_back(std::move(*b).value());
+    pieces[k] = std::make_shared<Piece>(std::move(*a).value());
+    pieces.push_back(std::make_shared<Piece>(std::move(*b).value()));
     return judge_pieces();
   }
 
@@ -363,6 +422,8 @@ class Refiner {
   std::vector<double> error_m_;  ///< that each piece adds to the sum over the shell
   int trials_ = 0;               ///< since the best partition
   Snapshot best_, smallest_;
+  std::vector<Snapshot> on_the_way_;  ///< one of each count of parts, ascending
+  std::size_t next_ = 0;              ///< of those of them that are offered
 };
 
 }  // namespace
@@ -374,9 +435,10 @@ struct PartitionSearch::Impl {
   /// The refiner's pieces, without what others hold and with their full fits.
   Result<Refinement> finished() {
     const bool is_full = refiner.pieces.size() >= options.max_parts;
-    Refinement result{refiner.pieces, refiner.is_within_target() ? "target" : is_full ? "parts" : "gain"};
+    Refinement result{{}, refiner.is_within_target() ? "target" : is_full ? "parts" : "gain"};
+    for (const auto& piece : refiner.pieces) result.pieces.push_back(*piece);
     shed_covered(set, result.pieces, options.fit);
-    if (auto outcome = fit_pieces(set, result.pieces, options.fit); !outcome) return outcome.error();
+    if (auto outcome = fit_pieces(set, result.pieces, options.fit, fits); !outcome) return outcome.error();
     return result;
   }
   bool may_split() const { return refiner.pieces.size() < options.max_parts; }
@@ -384,6 +446,7 @@ struct PartitionSearch::Impl {
   SolidSet& set;
   const BakeOptions& options;
   Refiner refiner;
+  std::vector<std::shared_ptr<const FullFits>> fits;  ///< of the partition finished last
   bool was_smallest = false, was_finer = false;
 };
 
@@ -418,16 +481,18 @@ Result<std::optional<Refinement>> PartitionSearch::other(const Progress& progres
     return std::optional(std::move(result).value());
   };
   if (!std::exchange(impl_->was_smallest, true) && refiner.go_to_smallest()) return finished();
-  if (std::exchange(impl_->was_finer, true)) return std::optional<Refinement>();
-  refiner.go_to_best();
-  const std::size_t parts = refiner.pieces.size();
-  for (bool can_gain = true; can_gain && impl_->may_split();) {
-    if (progress.stop()) return Error{Status::kCancelled, "cancelled while refining parts", ""};
-    auto split = refiner.split_to_save();
-    if (!split) return split.error();
-    can_gain = split.value();
+  if (!std::exchange(impl_->was_finer, true)) {
+    refiner.go_to_best();
+    const std::size_t parts = refiner.pieces.size();
+    for (bool can_gain = true; can_gain && impl_->may_split();) {
+      if (progress.stop()) return Error{Status::kCancelled, "cancelled while refining parts", ""};
+      auto split = refiner.split_to_save();
+      if (!split) return split.error();
+      can_gain = split.value();
+    }
+    if (refiner.pieces.size() > parts) return finished();
   }
-  return refiner.pieces.size() > parts ? finished() : std::optional<Refinement>();
+  return refiner.go_to_next_on_the_way() ? finished() : std::optional<Refinement>();
 }
 
 }  // namespace sqmap::bake

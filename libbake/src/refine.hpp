@@ -62,9 +62,10 @@ class PartitionSearch {
   /// (shed.hpp) and have their full fits. Errors: kCancelled, kBakeFailed.
   Result<Refinement> best(std::vector<Cell> cells, const Progress& progress);
 
-  /// After best(): another partition within the target whose maps may turn out to need fewer bytes, each time
-  /// a different one: that of fewest bytes foretold, whatever its error; then one of the best's parts, split
-  /// on as long as that is foretold to save. Empty: there is none left. Errors: as of best().
+  /// After best(): another partition whose maps may turn out to need fewer bytes, each time a different one:
+  /// that of fewest bytes foretold, whatever its error; then one of the best's parts, split on as long as
+  /// that is foretold to save; then some of those on the way, of most parts first: what is foretold of bytes
+  /// and errors is often wrong by half. Empty: there is none left. Errors: as of best().
   Result<std::optional<Refinement>> other(const Progress& progress);
 
  private:

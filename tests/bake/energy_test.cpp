@@ -14,8 +14,9 @@
 namespace sqmap::bake {
 namespace {
 
-Asset baked(const Mesh& mesh) {
+Asset baked(const Mesh& mesh, double max_error_percent = BakeOptions{}.max_error_percent) {
   BakeOptions options;
+  options.max_error_percent = max_error_percent;
   options.sample_count = 1000;
   return bake(test::as_source(mesh), options).value().asset;
 }
@@ -75,13 +76,19 @@ TEST(Energy, OnABakedLWithSharpEdgesFrictionTakesMoreThanTheEdgesGive) {
 }
 
 TEST(Energy, OnABakedLWithSharpEdgesPassivityLeavesNoGainThatTheReactionAloneHas) {
-  const Asset asset = baked(test::l_shape(2, 0.5));
-  EXPECT_GT(press_all_over(asset, {kReaction}).most_of_probe, 1.2);
-  for (const bool has_tracking : {false, true}) {
-    std::vector<runtime::EffectChoice> effects{kReaction, {"passivity", {}}};
-    if (has_tracking) effects.push_back({"tracking", {}});
-    EXPECT_LT(press_all_over(asset, effects).most_of_probe, 1.01) << (has_tracking ? "tracked" : "");
+  // How much the edges give depends on where parts and texels happen to end: worst of several bakes.
+  double worst = 0;
+  for (const double max_error_percent : {0.04, 0.08, 0.3}) {
+    const Asset asset = baked(test::l_shape(2, 0.5), max_error_percent);
+    worst = std::max(worst, press_all_over(asset, {kReaction}).most_of_probe);
+    for (const bool has_tracking : {false, true}) {
+      std::vector<runtime::EffectChoice> effects{kReaction, {"passivity", {}}};
+      if (has_tracking) effects.push_back({"tracking", {}});
+      EXPECT_LT(press_all_over(asset, effects).most_of_probe, 1.01)
+          << max_error_percent << (has_tracking ? " tracked" : "");
+    }
   }
+  EXPECT_GT(worst, 1.2);
 }
 
 }  // namespace

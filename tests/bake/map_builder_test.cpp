@@ -173,6 +173,25 @@ TEST(MapParts, GiveTexelsToThePartWhoseRaysMissWhereThoseTakeNoMemory) {
   EXPECT_GT(share_of(TexelCost::kHeld), 1.2 * share_of(TexelCost::kAll));
 }
 
+TEST(MapParts, TakeWhatIsTracedAlreadyOfTheSameShapesOnly) {
+  const Scene scene(test::box({0.4, 0.5, 0.6}));
+  std::vector<Part> parts{part_around({{0.9, 1.0, 1.1}, 0.7, 0.7}), part_around({{0.8, 1.0, 1.1}, 0.7, 0.7})};
+  const MeshQueries queries = scene.queries();
+  MapDrawer first(own_shapes(parts), {1.0, 1.0}, queries);
+  first.draw(parts, {2e-3, kNoLimit}, 1, TexelCost::kAll);
+  const std::vector<Part> drawn = parts;
+  std::vector<Part> moved = parts;
+  moved[1].object_from_part.translation_m.x = 0.01;
+  MapDrawer second(own_shapes(moved), {1.0, 1.0}, queries, first.traced());
+  second.draw(moved, {2e-3, kNoLimit}, 1, TexelCost::kAll);
+  EXPECT_EQ(moved[0].map, drawn[0].map);
+  EXPECT_NE(moved[1].map, drawn[1].map);
+  const auto is_known = [&](const auto& t) { return std::ranges::count(first.traced(), t) > 0; };
+  const auto known = static_cast<std::size_t>(std::ranges::count_if(second.traced(), is_known));
+  EXPECT_GT(known, 0U);
+  EXPECT_LT(known, second.traced().size());
+}
+
 TEST(MapParts, KeepToTheByteBudgetAndSaySo) {
   const Scene scene(test::box({0.4, 0.5, 0.6}));
   std::vector<Part> parts{part_around({{0.9, 1.0, 1.1}, 0.7, 0.7})};
