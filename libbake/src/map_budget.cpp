@@ -92,17 +92,17 @@ std::vector<Strided> strides(std::uint32_t quadrant_cells, ErrorAt error_at) {
 }
 
 TracedShape trace(const PlacedShape& placed, const MeshQueries& queries, const Quadrant& cells) {
-  TracedShape candidate;
-  candidate.placed = placed;
-  candidate.cells = cells;
+  TracedShape traced;
+  traced.placed = placed;
+  traced.cells = cells;
   const std::uint32_t rows = 2 * cells.rows + 1, cols = 4 * cells.cols;
-  candidate.field = trace_map(placed.shape, placed.object_from_part, rows, cols, queries);
-  const RayField& field = candidate.field;
+  traced.field = trace_map(placed.shape, placed.object_from_part, rows, cols, queries);
+  const RayField& field = traced.field;
   const MapGrid grid(placed.shape, rows, cols);
-  for (const double depth_m : field.depth_m) candidate.deepest_m = std::max(candidate.deepest_m, depth_m);
+  for (const double depth_m : field.depth_m) traced.deepest_m = std::max(traced.deepest_m, depth_m);
   std::size_t hits = 0;
   for (std::uint32_t texel = 0; texel < rows * cols; ++texel) hits += field.has_hit(texel);
-  candidate.hit_share = static_cast<double>(hits) / (rows * cols);
+  traced.hit_share = static_cast<double>(hits) / (rows * cols);
   std::size_t held = 0;
   for (std::uint32_t row = 0; row < rows; ++row) {
     const MissRun run = longest_miss_run(cols, [&](std::uint32_t col) {
@@ -113,16 +113,16 @@ TracedShape trace(const PlacedShape& placed, const MeshQueries& queries, const Q
     });
     held += cols - run.count;
   }
-  candidate.held_share = static_cast<double>(held) / (rows * cols);
-  candidate.has_seam = std::ranges::any_of(field.start_inside, [](std::uint8_t s) { return s != 0; });
+  traced.held_share = static_cast<double>(held) / (rows * cols);
+  traced.has_seam = std::ranges::any_of(field.start_inside, [](std::uint8_t s) { return s != 0; });
   const auto by_rows = [&](std::uint32_t stride) { return coarsening_error(field, grid, stride, 1); };
   const auto by_cols = [&](std::uint32_t stride) { return coarsening_error(field, grid, 1, stride); };
-  candidate.rows = strides(cells.rows, by_rows);
-  candidate.cols = strides(cells.cols, by_cols);
+  traced.rows = strides(cells.rows, by_rows);
+  traced.cols = strides(cells.cols, by_cols);
   // Against the field, a map of twice the spacing shows 3/4 of its error in depth (second order) and 1/2 in
   // occupancy (first order); the rest is the field's own.
-  candidate.own_error_m = error_m(by_rows(2), 1.0 / 3, 1) + error_m(by_cols(2), 1.0 / 3, 1);
-  return candidate;
+  traced.own_error_m = error_m(by_rows(2), 1.0 / 3, 1) + error_m(by_cols(2), 1.0 / 3, 1);
+  return traced;
 }
 
 /// The candidates of each part.
@@ -155,13 +155,13 @@ class Allotment {
   double stored_bytes(const std::vector<Choice>& choices) const {
     double sum = 0;
     for (std::size_t k = 0; k < choices.size(); ++k) {
-      const TracedShape& candidate = *candidates_[k][choices[k].candidate].traced;
-      sum += kStoredShare * candidate.hit_share * choices[k].texels * bits(candidate) / 8;
+      const TracedShape& traced = *candidates_[k][choices[k].candidate].traced;
+      sum += kStoredShare * traced.hit_share * choices[k].texels * bits(traced) / 8;
     }
     return sum;
   }
-  std::uint32_t bits(const TracedShape& candidate) const {
-    const double codes = candidate.deepest_m / (kStepShare * target_m_) + 2;
+  std::uint32_t bits(const TracedShape& traced) const {
+    const double codes = traced.deepest_m / (kStepShare * target_m_) + 2;
     return static_cast<std::uint32_t>(std::clamp(std::ceil(std::log2(codes)), 4.0, double(kMostBits)));
   }
   /// The price at which `fits(choices)` changes. `fits` holds at all prices below it, or at all above.
@@ -181,18 +181,17 @@ class Allotment {
     Choice best;
     double least = std::numeric_limits<double>::infinity();
     for (std::size_t k = 0; k < std::min(candidates.size(), most_shapes_); ++k) {
-      const TracedShape& candidate = *candidates[k].traced;
+      const TracedShape& traced = *candidates[k].traced;
       const bool held_only = cost_ == TexelCost::kHeld;
-      const double texel_bits = held_only
-                                    ? candidate.held_share * (bits(candidate) + (candidate.has_seam ? 1 : 0))
-                                    : bits(candidate);
+      const double texel_bits =
+          held_only ? traced.held_share * (bits(traced) + (traced.has_seam ? 1 : 0)) : bits(traced);
       const double row_bytes = held_only ? 3 : 0;
-      for (std::size_t r = 0; r < candidate.rows.size(); ++r) {
-        for (std::size_t c = 0; c < candidate.cols.size(); ++c) {
-          const Strided &row = candidate.rows[r], &col = candidate.cols[c];
-          const double error_m = row.error_m + col.error_m + candidate.own_error_m;
-          const double rows = 2.0 * candidate.cells.rows / row.stride + 1;
-          const double texels = rows * 4.0 * candidate.cells.cols / col.stride;
+      for (std::size_t r = 0; r < traced.rows.size(); ++r) {
+        for (std::size_t c = 0; c < traced.cols.size(); ++c) {
+          const Strided &row = traced.rows[r], &col = traced.cols[c];
+          const double error_m = row.error_m + col.error_m + traced.own_error_m;
+          const double rows = 2.0 * traced.cells.rows / row.stride + 1;
+          const double texels = rows * 4.0 * traced.cells.cols / col.stride;
           const double bytes = row_bytes * rows + texels * texel_bits / 8;
           const double cost = weight * error_m + price * bytes;
           if (cost < least) {

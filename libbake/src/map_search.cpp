@@ -222,7 +222,9 @@ Result<Drawn> draw_maps(Asset& asset, MapDrawer& drawer, std::size_t most_shapes
     if (!judged) return judged.error();
     const Shortfall& now = judged.value();
     const bool meets = now.worse() <= 1;
-    if (!meets && now.bytes > target.most_held) return Drawn{now.depth, now.sides, false, now.bytes};
+    const bool was_small = had_met && least.bytes <= target.most_held;
+    if (!meets && !was_small && now.bytes > target.most_held)
+      return Drawn{now.depth, now.sides, false, now.bytes};
     const auto gains = [share](double here, double before) {
       return before > 1 && here <= (1 - kWorthFinerMaps * (1 - share)) * before;
     };

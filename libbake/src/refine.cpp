@@ -311,10 +311,9 @@ class Refiner {
       const auto nearest = std::ranges::min_element(on_the_way_, {}, [&](const Snapshot& s) {
         return std::abs(static_cast<double>(s.pieces.size()) - parts);
       });
-      if (nearest->is_used || nearest->pieces.size() == best_.pieces.size() ||
-          nearest->pieces.size() == smallest_.pieces.size())
-        continue;
-      nearest->is_used = true;
+      const std::size_t size = nearest->pieces.size();
+      if (size == pieces.size() || size == best_.pieces.size() || size == smallest_.pieces.size()) continue;
+      ++next_;
       go_to(*nearest);
       return true;
     }
@@ -328,7 +327,6 @@ class Refiner {
     SharedPieces pieces;
     std::vector<double> error_m;
     double cost{};
-    bool is_used = false;
   };
 
   void go_to(const Snapshot& snapshot) {

@@ -248,9 +248,8 @@ std::optional<BakeResult> bake_sample(const std::string& name) {
 }
 
 TEST(Bake, TakesThePartitionWhoseMapsNeedFewBytes) {
-  // Cut on as long as that lowers the error of drafts, the hand has 24 parts in 129 kB; the partition that
-  // drafts foretell to need fewest bytes has 7 in 77 kB. One of those between needs fewer: drafts foretell it
-  // more bytes, and an error beyond what maps may reach.
+  // Of the partitions that refinement passes, the one that needs fewest bytes is neither the last nor the one
+  // that drafts foretell to: they foretell it more bytes, and an error beyond what maps may reach.
   const auto hand = bake_sample("hand.off");
   if (!hand) GTEST_SKIP() << "no hand.off";
   EXPECT_LE(runtime::Object::build(hand->asset).value().resident_bytes(), 68000U);
@@ -260,7 +259,7 @@ TEST(Bake, TakesThePartitionWhoseMapsNeedFewBytes) {
 }
 
 TEST(Bake, DrawsCoarserMapsWhereTheTargetAllowsThem) {
-  // With the maps foretold for the target it takes 63 kB and errs less than it may.
+  // With the maps foretold for the target it errs less than it may.
   const auto elephant = bake_sample("elephant.off");
   if (!elephant) GTEST_SKIP() << "no elephant.off";
   EXPECT_LE(runtime::Object::build(elephant->asset).value().resident_bytes(), 60000U);
@@ -270,7 +269,7 @@ TEST(Bake, DrawsCoarserMapsWhereTheTargetAllowsThem) {
 }
 
 TEST(Bake, DrawsMoreThanOnePartition) {
-  // The first that is within the target takes 67 kB, and one that is split on 55.
+  // One that is split on takes less than the first within the target.
   const auto dino = bake_sample("dino.off");
   if (!dino) GTEST_SKIP() << "no dino.off";
   EXPECT_LE(runtime::Object::build(dino->asset).value().resident_bytes(), 61000U);
