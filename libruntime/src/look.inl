@@ -205,11 +205,11 @@ class Looker {
     const VI mask = hn::BitCast(kDI, hn::Set(kDU, part_.row_word_mask()));
     const auto word_at = [&](VI at)
                              HWY_ATTR { return hn::And(hn::BitCast(kDI, gather_bytes(base, at)), mask); };
-    const VI one = all_int(size), at = row * one, above = at + all_int(stride_ * size);
+    const VI next = all_int(size), at = row * next, above = at + all_int(stride_ * size);
     words[0] = word_at(at);
-    words[1] = word_at(at + one);
+    words[1] = word_at(at + next);
     words[2] = stride_ == 1 ? words[1] : word_at(above);
-    words[3] = word_at(above + one);
+    words[3] = word_at(above + next);
   }
   /// Resident::row.
   HWY_INLINE VRow row_of(VI word, VI next) const noexcept {

@@ -150,18 +150,18 @@ class Object {
   /// Memory the object holds, itself included. With r rows, n texels of b bits that are held, c further
   /// crossings and v vertex samples in a part, of which the baker's parts have about one a hundred texels:
   ///
-  ///     constant + sum over parts of  record + 388 + u (r + 1) + ceil(n (b + s) / 8) + ceil(3 t / 2) + 36
-  ///     m^2
+  ///     constant + sum over parts of  record + 388 + u (r + 1) + ceil(n (b + s) / 8) + ceil(3 t / 2)
+  ///                                   + 36 m^2
   ///                                   + [c > 0] (ceil(r k / 64) + (2 + w) c)
   ///                                   + [v > 0] (ceil(r k / 64) + (4 + w) v)
   ///
   /// and 212 for a tapered part. k columns; s = 1 where any texel starts inside the mesh, else 0. Of a row
   /// all texels are held without all but one of the longest run, round the turn, of those whose rays hit
-  /// nothing and start alike; where no two such are neighbours all, and the first twice. (In maps of more
-  /// than 2^14 texels rows may begin at multiples of some power of two.) u = 3 and w = 2 where r k <= 65536,
-  /// else u = w = 4. t
-  /// boxes of the part's inside, at most 256, each with a start of layer 3; m cells a side of the part's
-  /// bounds, 0 without. The constant is below 200 bytes and the record at most 256, both fixed by the build.
+  /// nothing and start alike; where no two such are neighbours all, and the first twice. (Where n k > 2^(8 u
+  /// - 2) rows may begin at multiples of some power of two.) u = 3 and w = 2 where r k <= 65536, else u = w
+  /// = 4. t boxes of the part's inside, at most 256, each with a start of layer 3; m cells a side of the
+  /// part's bounds, 0 without. The constant is below 200 bytes and the record at most 256, both fixed by the
+  /// build.
   std::size_t resident_bytes() const noexcept;
 
  private:
