@@ -148,7 +148,9 @@ class Chart {
     const SurfaceSample<float> r = table_.sample(row, col);
     return part_.bend.is_none() ? r.normal : part_.bend.gradient(part_.bend.turn_at(r.point_m), r.normal);
   }
-  ChartAnswer second_layer(const Vec3f& p, const Foot<float>& foot, std::uint32_t stride) const noexcept;
+  /// `third`: with the vertex samples, which decide about sides too.
+  ChartAnswer second_layer(const Vec3f& p, const Foot<float>& foot, std::uint32_t stride,
+                           bool third) const noexcept;
   struct Step {
     float row, col;  ///< [cells of level 0]
     float gain;      ///< of the squared distance, by the linear model
@@ -166,6 +168,13 @@ class Chart {
   /// From (answer.row, answer.col), whose cell bounds a patch.
   void third_layer(const Vec3f& p, std::uint32_t stride, ChartAnswer& answer) const noexcept;
   bool vertex_fan(const Vec3f& p, const Cell& cell, ChartAnswer& answer) const noexcept;
+  /// fan_depth() in a cell with a vertex sample; in others `depth`.
+  float over_fan(const Cell& cell, float s, float t, float depth) const noexcept {
+    const std::uint32_t position = resident_.find(part_, part_.fans, cell.texel[0]);
+    if (position >= part_.fans.count || resident_.key(part_, part_.fans, position) != cell.texel[0])
+      return depth;
+    return resident_.fan_depth_at(part_, position, cell.depth, s, t);
+  }
   /// Largest convex curvature of the represented surface around (row, col), at the resolution of the cells; 0
   /// where it is flat or hollow.
   float convex_curvature(float row, float col, std::uint32_t stride) const noexcept;
@@ -220,7 +229,7 @@ inline Chart::Patch Chart::patch_at(const Cell& cell, float row, float col,
 inline ChartAnswer Chart::look(const Vec3f& p, bool third, std::uint32_t level, float edge) const noexcept {
   const std::uint32_t stride = part_.stride_at(level);
   const Foot<float> foot = table_.foot(part_.bend.straightened(p));
-  ChartAnswer answer = second_layer(p, foot, stride);
+  ChartAnswer answer = second_layer(p, foot, stride, third);
   // What the bounds prove leaves no doubt.
   if (const Certainty told = told_by(resident_, part_, p); told != Certainty::kUnsure) {
     answer.inside = told == Certainty::kInside;
@@ -310,8 +319,8 @@ inline float Chart::convex_curvature(float row, float col, std::uint32_t stride)
   return most;
 }
 
-inline ChartAnswer Chart::second_layer(const Vec3f& p, const Foot<float>& foot,
-                                       std::uint32_t stride) const noexcept {
+inline ChartAnswer Chart::second_layer(const Vec3f& p, const Foot<float>& foot, std::uint32_t stride,
+                                       bool third) const noexcept {
   const Cell cell = cell_at(foot.row, foot.col, stride);
   const float inverse = 1.0F / static_cast<float>(stride);
   const float s = (foot.row - static_cast<float>(cell.row)) * inverse;
@@ -322,7 +331,9 @@ inline ChartAnswer Chart::second_layer(const Vec3f& p, const Foot<float>& foot,
   float doubt;
   if (cell.eligible) {
     const float low = depth[0] + t * (depth[1] - depth[0]), high = depth[2] + t * (depth[3] - depth[2]);
-    shift = (low + s * (high - low)) - depth[nearest];
+    float here = low + s * (high - low);
+    if (third && stride == 1) here = over_fan(cell, s, t, here);
+    shift = here - depth[nearest];
     const float least = lesser(lesser(depth[0], depth[1]), lesser(depth[2], depth[3]));
     const float most = greater(greater(depth[0], depth[1]), greater(depth[2], depth[3]));
     doubt = 0.25F * (most - least) + part_.depth_step;

@@ -241,6 +241,7 @@ class Looker {
     const VI first = hn::ShiftLeftSame(k, starts.step_shift) + all_int((1U << starts.step_shift) / 2);
     return to_float(first) + all(0.5F);
   }
+  HWY_NOINLINE V over_fans(M lanes, const VCell& cell, V s, V t, V depth) const noexcept;
   HWY_NOINLINE void further_sheets(M lanes, VI texel, V shift, V depth, V& gap, V& crossing, V& inside,
                                    V& leaving, V& later) const noexcept;
 
@@ -294,7 +295,12 @@ SQMAP_KERNEL Look Looker::look(const V3& p, M wanted, float reach) const noexcep
   const V near_depth = nearest_of(depth);
   const VI near_texel = nearest_of(corners.texel);
   const V low = depth[0] + t * (depth[1] - depth[0]), high = depth[2] + t * (depth[3] - depth[2]);
-  const V shift = hn::IfThenElseZero(corners.eligible, (low + s * (high - low)) - near_depth);
+  V here = low + s * (high - low);
+  if (third_ && stride_ == 1 && part_.fans.count > 0) {
+    const M held = hn::And(hn::And(wanted, corners.eligible), block_holds(part_.fans, cell.texel[0]));
+    if (!none(held)) here = over_fans(held, cell, s, t, here);
+  }
+  const V shift = hn::IfThenElseZero(corners.eligible, here - near_depth);
   const V shallow = least(least(depth[0], depth[1]), least(depth[2], depth[3]));
   const V deep = most(most(depth[0], depth[1]), most(depth[2], depth[3]));
   const V doubt =
@@ -358,6 +364,26 @@ SQMAP_KERNEL Look Looker::look(const V3& p, M wanted, float reach) const noexcep
   const V sure = pick(as_float(mixed), most(foot.depth, zero), all(part_.sphere_radius));
   look.certainty = least(gap, sure) / most(doubt, all(kLeastDoubt * part_.sphere_radius));
   return look;
+}
+
+/// Chart::over_fan.
+HWY_NOINLINE V Looker::over_fans(M lanes, const VCell& cell, V s, V t, V depth) const noexcept {
+  HWY_ALIGN std::int32_t texels[kMostLanes];
+  HWY_ALIGN float all_s[kMostLanes], all_t[kMostLanes], corners[4][kMostLanes], depths[kMostLanes];
+  hn::Store(cell.texel[0], kDI, texels);
+  hn::Store(s, kD, all_s);
+  hn::Store(t, kD, all_t);
+  for (int k = 0; k < 4; ++k) hn::Store(cell.depth[k], kD, corners[k]);
+  hn::Store(depth, kD, depths);
+  for (std::uint32_t left = bits_of(lanes); left != 0; left &= left - 1) {
+    const int lane = std::countr_zero(left);
+    const auto key = static_cast<std::uint32_t>(texels[lane]);
+    const std::uint32_t position = resident_.find(part_, part_.fans, key);
+    if (position >= part_.fans.count || resident_.key(part_, part_.fans, position) != key) continue;
+    const float corner[4] = {corners[0][lane], corners[1][lane], corners[2][lane], corners[3][lane]};
+    depths[lane] = resident_.fan_depth_at(part_, position, corner, all_s[lane], all_t[lane]);
+  }
+  return hn::Load(kD, depths);
 }
 
 HWY_NOINLINE void Looker::further_sheets(M lanes, VI texel, V shift, V depth, V& gap, V& crossing, V& inside,

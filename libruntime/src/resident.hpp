@@ -39,6 +39,7 @@
 #include "sqmap/asset/asset.hpp"
 #include "sqmap/asset/shape_table.hpp"
 
+#include "fan_depth.hpp"
 #include "part_bend.hpp"
 
 namespace sqmap::runtime {
@@ -257,6 +258,13 @@ class Resident {
   }
   std::uint16_t fan_code(const PartRecord& part, std::uint32_t position) const noexcept {
     return load<std::uint16_t>(part.fans.values_at + 4 * position + 2);
+  }
+  /// fan_depth() of the vertex sample at a position of the list.
+  float fan_depth_at(const PartRecord& part, std::uint32_t position, const float (&corner)[4], float s,
+                     float t) const noexcept {
+    const std::uint32_t where = fan_place(part, position);
+    return fan_depth(corner, s, t, static_cast<float>(where & 255U) * (1 / 256.0F),
+                     static_cast<float>(where >> 8U) * (1 / 256.0F), part.depth_of(fan_code(part, position)));
   }
   /// The part's curves, unpacked.
   void unpack(const PartRecord& part, ShapeTable<float>& table) const noexcept;

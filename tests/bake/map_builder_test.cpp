@@ -213,21 +213,26 @@ TEST(VertexSamples, CatchASpikeBetweenTexels) {
   const Scene scene(std::move(mesh));
   Part part = part_around({{1, 1, 1}, 1, 1});
   draft_map(part, scene.queries(), 8);
-  const auto distance_m = [&] {
+  const auto told = [&](const Vec3d& p_m, runtime::Layer layer) {
     Asset asset;
     asset.r_max_m = 2;
     asset.sphere = {{}, 1.1};
     asset.parts = {part};
     auto object = runtime::Object::build(asset);
     EXPECT_TRUE(object.ok()) << (object ? "" : object.error().finding);
-    return std::abs(
-        object.value().query(cast<float>(spike_m), {runtime::Layer::kThree, 0}).signed_distance_m);
+    return object.value().query(cast<float>(p_m), {layer, 0});
   };
+  const auto distance_m = [&] { return std::abs(told(spike_m, runtime::Layer::kThree).signed_distance_m); };
+  const Vec3d below_tip_m = 0.9 * spike_m;
   const float without = distance_m();
+  EXPECT_FALSE(told(below_tip_m, runtime::Layer::kThree).inside);
   add_vertex_samples(part, scene.queries(), 1e-3);
   EXPECT_FALSE(part.map.vertex_samples.empty());
   EXPECT_GT(without, 0.05F);
   EXPECT_LT(distance_m(), 0.01F);
+  // They tell sides, too; layer 2 does not read them.
+  EXPECT_TRUE(told(below_tip_m, runtime::Layer::kThree).inside);
+  EXPECT_FALSE(told(below_tip_m, runtime::Layer::kTwo).inside);
 }
 
 TEST(Solid, SplitsAreClosedAndTheirVolumesAdd) {

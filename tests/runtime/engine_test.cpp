@@ -300,6 +300,29 @@ Asset wide_asset(std::uint32_t rows, std::uint32_t cols) {
   return test::asset_of({std::move(part)}, 2);
 }
 
+TEST(FanDepth, IsLinearOnTheTrianglesBetweenTheSampleAndTheSides) {
+  const float corner[4] = {1, 2, 4, 7}, apex = 9;
+  const float place[4][2] = {{0, 0}, {0, 1}, {1, 0}, {1, 1}};
+  for (const auto& [at_s, at_t] : {std::pair{0.5F, 0.25F}, {0.0F, 0.75F}, {0.0F, 0.0F}, {0.9F, 0.99F}}) {
+    SCOPED_TRACE(at_s);
+    EXPECT_EQ(fan_depth(corner, at_s, at_t, at_s, at_t, apex), apex);
+    for (const auto& [i, j] : {std::pair{0, 1}, {1, 3}, {3, 2}, {2, 0}}) {  // the sides
+      for (const float u : {0.1F, 0.5F, 0.8F}) {
+        for (const float v : {0.2F, 0.7F, 1.0F}) {  // v of the way from the sample to the place u of the side
+          const float rim_s = place[i][0] + u * (place[j][0] - place[i][0]);
+          const float rim_t = place[i][1] + u * (place[j][1] - place[i][1]);
+          if (rim_s == at_s || rim_t == at_t)
+            continue;  // on a side through the sample: a triangle without area
+          const float rim = corner[i] + u * (corner[j] - corner[i]);
+          EXPECT_NEAR(
+              fan_depth(corner, at_s + v * (rim_s - at_s), at_t + v * (rim_t - at_t), at_s, at_t, apex),
+              apex + v * (rim - apex), 1e-4);
+        }
+      }
+    }
+  }
+}
+
 TEST(Resident, HoldsEveryCodeStartSheetAndSample) {
   std::vector<Asset> assets{wide_asset(33, 8192), wide_asset(33, 1600)};
   for (const std::uint32_t bits : {4U, 7U, 8U, 11U, 16U}) assets.push_back(test::mixed_asset(bits));
