@@ -21,7 +21,7 @@ namespace sqmap::bake {
 namespace {
 
 // Vertex samples are kept where the surface misses the vertex by this multiple of the error target.
-constexpr double kVertexTolerance = 2;
+constexpr double kVertexTolerance = 3;
 // Shells that finished maps are judged in: points, and half widths as shares of R_max. Of the narrow one's
 // points five times as many are on the wrong side. Few points do for objects that are small enough: others
 // have maps that are chosen by what points say, and learn them.
