@@ -170,10 +170,8 @@ class Chart {
   bool vertex_fan(const Vec3f& p, const Cell& cell, ChartAnswer& answer) const noexcept;
   /// fan_depth() in a cell with a vertex sample; in others `depth`.
   float over_fan(const Cell& cell, float s, float t, float depth) const noexcept {
-    const std::uint32_t position = resident_.find(part_, part_.fans, cell.texel[0]);
-    if (position >= part_.fans.count || resident_.key(part_, part_.fans, position) != cell.texel[0])
-      return depth;
-    return resident_.fan_depth_at(part_, position, cell.depth, s, t);
+    const std::uint32_t position = resident_.find_fan(part_, cell.texel[0]);
+    return position < part_.fans.count ? resident_.fan_depth_at(part_, position, cell.depth, s, t) : depth;
   }
   /// Largest convex curvature of the represented surface around (row, col), at the resolution of the cells; 0
   /// where it is flat or hollow.

@@ -164,9 +164,8 @@ inline void Chart::third_layer(const Vec3f& p, std::uint32_t stride, ChartAnswer
 }
 
 inline bool Chart::vertex_fan(const Vec3f& p, const Cell& cell, ChartAnswer& answer) const noexcept {
-  const std::uint32_t position = resident_.find(part_, part_.fans, cell.texel[0]);
-  if (position >= part_.fans.count || resident_.key(part_, part_.fans, position) != cell.texel[0])
-    return false;
+  const std::uint32_t position = resident_.find_fan(part_, cell.texel[0]);
+  if (position >= part_.fans.count) return false;
   const std::uint32_t where = resident_.fan_place(part_, position);
   const auto low = static_cast<float>(cell.row), left = static_cast<float>(cell.col);
   const float top = low + 1.0F, right = left + 1.0F;

@@ -12,10 +12,9 @@ HWY_NOINLINE M Walker::set_aside(const Walk& walk, const VCell& cell, VI entry, 
   std::uint32_t count = first;
   for (std::uint32_t wanted = bits_of(lanes); wanted != 0; wanted &= wanted - 1) {
     const int lane = std::countr_zero(wanted);
-    const auto texel = static_cast<std::uint32_t>(texels[lane]);
-    const std::uint32_t position = looker_.resident().find(part_, part_.fans, texel);
-    if (position >= part_.fans.count || looker_.resident().key(part_, part_.fans, position) != texel)
-      continue;
+    const std::uint32_t position =
+        looker_.resident().find_fan(part_, static_cast<std::uint32_t>(texels[lane]));
+    if (position >= part_.fans.count) continue;
     held[lane] = 1;
     fans_.place[count] = looker_.resident().fan_place(part_, position);
     fans_.code[count++] = looker_.resident().fan_code(part_, position);

@@ -377,9 +377,8 @@ HWY_NOINLINE V Looker::over_fans(M lanes, const VCell& cell, V s, V t, V depth) 
   hn::Store(depth, kD, depths);
   for (std::uint32_t left = bits_of(lanes); left != 0; left &= left - 1) {
     const int lane = std::countr_zero(left);
-    const auto key = static_cast<std::uint32_t>(texels[lane]);
-    const std::uint32_t position = resident_.find(part_, part_.fans, key);
-    if (position >= part_.fans.count || resident_.key(part_, part_.fans, position) != key) continue;
+    const std::uint32_t position = resident_.find_fan(part_, static_cast<std::uint32_t>(texels[lane]));
+    if (position >= part_.fans.count) continue;
     const float corner[4] = {corners[0][lane], corners[1][lane], corners[2][lane], corners[3][lane]};
     depths[lane] = resident_.fan_depth_at(part_, position, corner, all_s[lane], all_t[lane]);
   }

@@ -259,6 +259,11 @@ class Resident {
   std::uint16_t fan_code(const PartRecord& part, std::uint32_t position) const noexcept {
     return load<std::uint16_t>(part.fans.values_at + 4 * position + 2);
   }
+  /// Position of the vertex sample in the cell of that lowest corner; fans.count where there is none.
+  std::uint32_t find_fan(const PartRecord& part, std::uint32_t texel) const noexcept {
+    const std::uint32_t position = find(part, part.fans, texel);
+    return position < part.fans.count && key(part, part.fans, position) == texel ? position : part.fans.count;
+  }
   /// fan_depth() of the vertex sample at a position of the list.
   float fan_depth_at(const PartRecord& part, std::uint32_t position, const float (&corner)[4], float s,
                      float t) const noexcept {
